@@ -1,0 +1,191 @@
+//! Atomic writing, reading with the path in the error, hashing.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sha2::{Digest as _, Sha256};
+use tempfile::NamedTempFile;
+
+/// A file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum IoError {
+    /// The operating system said no.
+    #[error("failed to {action} {}: {source}", path.display())]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The content is not the JSON it should be.
+    #[error("{}:{}:{}: {source}", path.display(), source.line(), source.column())]
+    Json {
+        /// Which file.
+        path: PathBuf,
+        /// Where and what.
+        source: serde_json::Error,
+    },
+}
+
+impl IoError {
+    /// Names action and path of a system error.
+    pub fn system(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::System { action, path, source }
+    }
+}
+
+/// A file being written under a temporary name beside its final one. Dropped without [`AtomicFile::commit`] it leaves
+/// nothing behind.
+#[derive(Debug)]
+pub struct AtomicFile {
+    writer: BufWriter<NamedTempFile>,
+    path: PathBuf,
+}
+
+impl AtomicFile {
+    /// Begins a file that shall be at `path`; its folder is made if needed.
+    ///
+    /// # Errors
+    ///
+    /// When folder or temporary file cannot be made.
+    pub fn create(path: &Path) -> Result<Self, IoError> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        create_dir(folder)?;
+        let file = tempfile::Builder::new()
+            .prefix(".partial-")
+            .tempfile_in(folder)
+            .map_err(IoError::system("create a temporary file in", folder))?;
+        Ok(Self { writer: BufWriter::with_capacity(1 << 18, file), path: path.to_owned() })
+    }
+
+    /// Flushes, syncs and renames to the final name, replacing what was there.
+    ///
+    /// # Errors
+    ///
+    /// When the disk is full or the name cannot be taken; then nothing is at the final name that was not before.
+    pub fn commit(self) -> Result<(), IoError> {
+        let Self { writer, path } = self;
+        let file = writer.into_inner().map_err(|error| IoError::system("write", &path)(error.into_error()))?;
+        file.as_file().sync_all().map_err(IoError::system("sync", &path))?;
+        set_usual_permissions(file.as_file()).map_err(IoError::system("set permissions of", &path))?;
+        file.persist(&path).map_err(|error| IoError::system("rename to", &path)(error.error))?;
+        sync_folder(&path)
+    }
+}
+
+/// A temporary file is made for its owner alone; a result is for everyone.
+fn set_usual_permissions(file: &File) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    }
+    Ok(())
+}
+
+fn sync_folder(path: &Path) -> Result<(), IoError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let sync = || File::open(folder)?.sync_all();
+    sync().map_err(IoError::system("sync", folder))
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, buffer: &[u8]) -> std::io::Result<usize> {
+        self.writer.write(buffer)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, position: SeekFrom) -> std::io::Result<u64> {
+        self.writer.seek(position)
+    }
+}
+
+/// Makes a folder and its parents.
+///
+/// # Errors
+///
+/// When the system refuses.
+pub fn create_dir(path: &Path) -> Result<(), IoError> {
+    std::fs::create_dir_all(path).map_err(IoError::system("create folder", path))
+}
+
+/// Reads a whole file.
+///
+/// # Errors
+///
+/// When it is not there or cannot be read.
+pub fn read(path: &Path) -> Result<Vec<u8>, IoError> {
+    std::fs::read(path).map_err(IoError::system("read", path))
+}
+
+/// Writes a whole file atomically.
+///
+/// # Errors
+///
+/// As [`AtomicFile::commit`].
+pub fn write(path: &Path, content: &[u8]) -> Result<(), IoError> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(content).map_err(IoError::system("write", path))?;
+    file.commit()
+}
+
+/// Reads JSON.
+///
+/// # Errors
+///
+/// With line and column when the content is not a `T`.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, IoError> {
+    serde_json::from_slice(&read(path)?).map_err(|source| IoError::Json { path: path.to_owned(), source })
+}
+
+/// Writes indented JSON with a line feed at its end, atomically.
+///
+/// # Errors
+///
+/// As [`write()`].
+pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), IoError> {
+    let mut text =
+        serde_json::to_vec_pretty(value).map_err(|source| IoError::Json { path: path.to_owned(), source })?;
+    text.push(b'\n');
+    write(path, &text)
+}
+
+/// Lower-case hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// SHA-256 of bytes, in hexadecimal.
+pub fn sha256_bytes(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of a file, in hexadecimal, read in pieces.
+///
+/// # Errors
+///
+/// When it cannot be read.
+pub fn sha256_file(path: &Path) -> Result<String, IoError> {
+    let file = File::open(path).map_err(IoError::system("open", path))?;
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let mut hasher = Sha256::new();
+    let mut buffer = vec![0_u8; 1 << 18];
+    loop {
+        let n = reader.read(&mut buffer).map_err(IoError::system("read", path))?;
+        if n == 0 {
+            return Ok(hex(&hasher.finalize()));
+        }
+        hasher.update(&buffer[..n]);
+    }
+}

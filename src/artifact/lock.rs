@@ -1,0 +1,50 @@
+//! One run a directory: the second says so and stops.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+
+use crate::artifact::{IoError, create_dir};
+
+/// Held while a command writes into a run directory. The system drops it with the process, so a killed run leaves no
+/// stale lock.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
+}
+
+/// The lock could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// Another process holds it.
+    #[error("another ntp command is writing into {}; wait for it or choose another --out", directory.display())]
+    Held {
+        /// The run directory.
+        directory: PathBuf,
+    },
+    /// The lock file could not be opened.
+    #[error(transparent)]
+    Io(#[from] IoError),
+}
+
+impl RunLock {
+    /// Takes the lock of a run directory, which is made if needed.
+    ///
+    /// # Errors
+    ///
+    /// [`LockError::Held`] at once when another process has it.
+    pub fn take(directory: &Path) -> Result<Self, LockError> {
+        create_dir(directory)?;
+        let path = directory.join(".lock");
+        let file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(&path)
+            .map_err(IoError::system("open", &path))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self { _file: file }),
+            Err(TryLockError::WouldBlock) => Err(LockError::Held { directory: directory.to_owned() }),
+            Err(TryLockError::Error(source)) => Err(IoError::system("lock", &path)(source).into()),
+        }
+    }
+}

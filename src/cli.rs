@@ -1,0 +1,1 @@
+//! Every clap definition; no logic.

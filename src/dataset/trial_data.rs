@@ -1,0 +1,32 @@
+//! What a learner reads from a dataset: boundary observations and call trees, nothing else.
+
+use crate::task::{Family, Split};
+use crate::trace::ProgramCall;
+
+/// One episode as a learner sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialData {
+    /// The task's id: trials of the same task are paired.
+    pub task_id: String,
+    /// Its family.
+    pub family: Family,
+    /// Its split; a learner takes [`Split::Seen`] alone.
+    pub split: Split,
+    /// Which trial of its task.
+    pub trial: u32,
+    /// How many boundary frames.
+    pub n_frames: usize,
+    /// `[n_frames, 3 * n_slots + 2]`, row by row: [`crate::trace::Observation::to_flat`] of each boundary frame.
+    pub observations: Vec<f32>,
+    /// The call tree; spans count boundary frames.
+    pub calls: Vec<ProgramCall>,
+}
+
+/// A dataset in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DatasetTrials {
+    /// Slots of every scene in it.
+    pub n_slots: usize,
+    /// Its successful episodes in order of index.
+    pub trials: Vec<TrialData>,
+}

@@ -1,0 +1,1 @@
+//! Scripted programs that act in physics and yield checked episodes.

@@ -1,0 +1,32 @@
+//! Neural Task Programming as a dataset pipeline.
+//!
+//! ```text
+//! tasks ─► generate ─► convert ─► train ─► rollout ─► report
+//! ```
+//!
+//! Stages meet only through files whose schema is in `schemas/`. The modules below are in reading order; none uses a
+//! later one. ARCHITECTURE.md is the map.
+
+pub mod artifact;
+pub mod geometry;
+pub mod program;
+pub mod progress;
+pub mod scene;
+pub mod seed;
+pub mod table;
+
+pub mod dataset;
+pub mod expert;
+pub mod model;
+pub mod pipeline;
+pub mod recording;
+pub mod report;
+pub mod rollout;
+pub mod sim;
+pub mod task;
+pub mod trace;
+pub mod training;
+pub mod visualize;
+
+pub mod cli;
+pub mod commands;

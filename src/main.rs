@@ -1,0 +1,3 @@
+//! The `ntp` binary.
+
+fn main() {}

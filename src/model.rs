@@ -1,0 +1,1 @@
+//! NTP in burn: encoders, interpreter, core, program memory, argument decoder.

@@ -1,0 +1,1 @@
+//! A pipeline file, resolved into plans, run stage by stage.

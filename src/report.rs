@@ -1,0 +1,1 @@
+//! Rollouts and metrics into tables, plots and one page, by Polars.

@@ -1,0 +1,70 @@
+//! What the interpreter asks and what a policy answers.
+
+use std::sync::Arc;
+
+use crate::program::Program;
+use crate::scene::SlotIndex;
+use crate::trace::{Observation, Prediction, Span};
+
+/// A demonstration as a policy sees it: its boundary observations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Specification {
+    /// Slots of each observation.
+    pub n_slots: usize,
+    /// Boundary frames.
+    pub n_frames: usize,
+    /// `[n_frames, 3 * n_slots + 2]`, row by row.
+    pub observations: Vec<f32>,
+}
+
+impl Specification {
+    /// The whole of it.
+    pub fn whole(&self) -> Span {
+        Span { begin: 0, end: self.n_frames as u32 }
+    }
+}
+
+/// One decision that is asked for: the program on top of an episode's stack.
+#[derive(Clone, Debug)]
+pub struct Query {
+    /// Which of the episodes that run side by side; stays the same from an episode's first query to its last.
+    pub episode: usize,
+    /// Decisions made in this episode before.
+    pub decision: u32,
+    /// Depth of the running program, 0 for the root: with `episode` it names a frame of the call stack.
+    pub depth: u8,
+    /// Steps the running call has made before; 0 right after it was called.
+    pub step: u16,
+    /// The whole demonstration.
+    pub specification: Arc<Specification>,
+    /// The part that the running program may see.
+    pub window: Span,
+    /// The running program.
+    pub program: Program,
+    /// What is seen now.
+    pub observation: Observation,
+}
+
+/// The answer: one step of the running program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// What to call; [`Program::None`] to call nothing and end.
+    pub program: Program,
+    /// The part the callee may see; inside the query's window. For a primitive the window itself.
+    pub scope: Span,
+    /// For `move_to`.
+    pub argument: Option<SlotIndex>,
+    /// Whether the running program ends with this step.
+    pub end_of_program: bool,
+    /// The probabilities behind it, for viewers; `None` where there are none.
+    pub prediction: Option<Prediction>,
+}
+
+/// Decides for many episodes at once.
+pub trait Policy {
+    /// The variant's name, as in reports.
+    fn name(&self) -> &str;
+
+    /// One decision a query, in order. Must not depend on which queries come together.
+    fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;
+}

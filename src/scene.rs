@@ -1,0 +1,176 @@
+//! What stands on the table and where: the one value that simulation, recordings and viewers share.
+//!
+//! A [`Scene`] is what does not change in an episode (bodies and slots), a [`SceneState`] what does (poses). Neither
+//! knows of the physics engine.
+//!
+//! # Slots
+//!
+//! A program's argument and an observation speak of *slots*, not of bodies. A slot of a block or container shows that
+//! one body. A slot of a category shows one of its instances: the one locked now, see [`Slot::bodies`].
+
+use crate::geometry::{Pose, Vec3};
+
+/// Index of a body in [`Scene::bodies`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BodyIndex(pub u16);
+
+/// Index of a slot in [`Scene::slots`]: what `move_to` takes as its argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SlotIndex(pub u16);
+
+/// The form of a body, about its own centre, z up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A box.
+    Cuboid {
+        /// Half of each edge, in metres.
+        half_extents_m: [f32; 3],
+    },
+    /// An upright cylinder.
+    Cylinder {
+        /// Radius in metres.
+        radius_m: f32,
+        /// Half of the height in metres.
+        half_height_m: f32,
+    },
+    /// A ball.
+    Ball {
+        /// Radius in metres.
+        radius_m: f32,
+    },
+    /// A box without lid. The body's centre is the middle of the *floor's upper side*.
+    OpenBox {
+        /// Half of the inner width and depth, and the inner height, in metres.
+        inner_m: [f32; 3],
+        /// Thickness of walls and floor, in metres.
+        wall_m: f32,
+    },
+}
+
+impl Shape {
+    /// Half of the axis-aligned box around the body when upright; for an open box of its inner space.
+    pub fn half_extents_m(&self) -> Vec3 {
+        match *self {
+            Self::Cuboid { half_extents_m: [x, y, z] } => Vec3::new(x, y, z),
+            Self::Cylinder { radius_m, half_height_m } => Vec3::new(radius_m, radius_m, half_height_m),
+            Self::Ball { radius_m } => Vec3::repeat(radius_m),
+            Self::OpenBox { inner_m: [x, y, height], .. } => Vec3::new(x, y, height / 2.0),
+        }
+    }
+}
+
+/// Whether a body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mobility {
+    /// Pushed, grasped and dropped.
+    Movable,
+    /// Bolted to the table.
+    Fixed,
+}
+
+/// One body of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Unique in the scene, e.g. `block_D` or `can_3`.
+    pub name: String,
+    /// Its form.
+    pub shape: Shape,
+    /// Whether it moves.
+    pub mobility: Mobility,
+    /// Red, green, blue as in an sRGB picture.
+    pub color: [u8; 3],
+}
+
+/// What an argument can name: one body, or whichever instance of a category is locked now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// Unique in the scene, e.g. `block_D` or `can`.
+    pub name: String,
+    /// The bodies the slot may show. With several, the slot shows the one that is *locked*: the nearest to the gripper
+    /// that lies in no container; it stays locked while it is carried and is chosen anew when it lies in one.
+    /// With none left to choose, the last one stays.
+    pub bodies: Vec<BodyIndex>,
+}
+
+/// The unchanging part of an episode's world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// All bodies but table and gripper.
+    pub bodies: Vec<Body>,
+    /// What arguments and observations speak of.
+    pub slots: Vec<Slot>,
+    /// Half of the table's width (x) and depth (y), in metres. Its surface is at z = 0.
+    pub table_half_m: [f32; 2],
+}
+
+impl Scene {
+    /// The body behind an index.
+    pub fn body(&self, index: BodyIndex) -> &Body {
+        &self.bodies[usize::from(index.0)]
+    }
+
+    /// The slot behind an index.
+    pub fn slot(&self, index: SlotIndex) -> &Slot {
+        &self.slots[usize::from(index.0)]
+    }
+
+    /// All body indices in order.
+    pub fn body_indices(&self) -> impl Iterator<Item = BodyIndex> + use<> {
+        (0..self.bodies.len() as u16).map(BodyIndex)
+    }
+}
+
+/// The changing part: where everything is at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneState {
+    /// The gripper's reference point: 2 cm above the centre of what it holds, between the fingers.
+    pub gripper_in_world: Pose,
+    /// Distance between the fingers, in metres.
+    pub opening_m: f32,
+    /// The body in the gripper, if any.
+    pub held: Option<BodyIndex>,
+    /// One pose a body, in the order of [`Scene::bodies`].
+    pub bodies_in_world: Vec<Pose>,
+}
+
+impl SceneState {
+    /// Where a body is.
+    pub fn body_in_world(&self, index: BodyIndex) -> &Pose {
+        &self.bodies_in_world[usize::from(index.0)]
+    }
+}
+
+/// Whether a body's centre lies inside an open box: between its walls and below twice its rim.
+pub fn lies_inside(scene: &Scene, state: &SceneState, body: BodyIndex, container: BodyIndex) -> bool {
+    let Shape::OpenBox { inner_m: [half_x, half_y, height], .. } = scene.body(container).shape else {
+        return false;
+    };
+    let body_in_container = state.body_in_world(container).inv_mul(state.body_in_world(body)).translation.vector;
+    body_in_container.x.abs() <= half_x
+        && body_in_container.y.abs() <= half_y
+        && (-0.01..2.0 * height).contains(&body_in_container.z)
+}
+
+/// Whether a body lies inside any open box of the scene.
+pub fn lies_in_any_container(scene: &Scene, state: &SceneState, body: BodyIndex) -> bool {
+    scene.body_indices().any(|container| container != body && lies_inside(scene, state, body, container))
+}
+
+/// The bodies that the slots show now, given those they showed before (none at the start). See [`Slot::bodies`].
+pub fn locked_bodies(scene: &Scene, state: &SceneState, before: Option<&[BodyIndex]>) -> Vec<BodyIndex> {
+    let gripper = state.gripper_in_world.translation.vector;
+    let distance = |body: BodyIndex| (state.body_in_world(body).translation.vector - gripper).norm();
+    let lock = |slot_idx: usize, slot: &Slot| {
+        let last = before.map(|bodies| bodies[slot_idx]);
+        if slot.bodies.len() == 1 {
+            return slot.bodies[0];
+        }
+        let keeps = |body: BodyIndex| state.held == Some(body) || !lies_in_any_container(scene, state, body);
+        if let Some(last) = last.filter(|&body| keeps(body)) {
+            return last;
+        }
+        let free = slot.bodies.iter().copied().filter(|&body| !lies_in_any_container(scene, state, body));
+        free.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).or(last).unwrap_or(slot.bodies[0])
+    };
+    scene.slots.iter().enumerate().map(|(slot_idx, slot)| lock(slot_idx, slot)).collect()
+}

@@ -1,0 +1,1 @@
+//! The tabletop world in rapier3d: bodies, gripper, robot API, recorded frames.

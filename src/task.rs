@@ -1,0 +1,168 @@
+//! Tasks: what is to be reached, in which order, and whether a learner may train on it.
+//!
+//! # Input and output
+//!
+//! Drawn from a seed or imported from the authors' task file; written as `tasks.json` (schemas/tasks.schema.json).
+//! The split is decided here and nowhere else.
+
+mod goal;
+mod import;
+mod layout;
+mod sampler;
+mod set;
+
+pub use goal::{Condition, Goal, condition_holds, goal_holds};
+pub use import::{ImportError, import};
+pub use layout::{Trial, initial_state, scene};
+pub use sampler::{SampleError, sample};
+pub use set::{TaskSet, TaskSetError};
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::program::Program;
+use crate::scene::SlotIndex;
+
+/// A kind of task: its objects, its programs, its goal conditions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Family {
+    /// Eight lettered blocks are stacked into towers.
+    BlockStacking,
+    /// Objects of four categories are put into four containers.
+    ObjectSorting,
+}
+
+impl Family {
+    /// Every family.
+    pub const ALL: [Self; 2] = [Self::BlockStacking, Self::ObjectSorting];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BlockStacking => "block_stacking",
+            Self::ObjectSorting => "object_sorting",
+        }
+    }
+
+    /// The start of suite names: `stacking_unseen`, `sorting_unseen`.
+    pub fn short_name(self) -> &'static str {
+        match self {
+            Self::BlockStacking => "stacking",
+            Self::ObjectSorting => "sorting",
+        }
+    }
+
+    /// The program at the root of its call trees.
+    pub fn root_program(self) -> Program {
+        match self {
+            Self::BlockStacking => Program::BlockStacking,
+            Self::ObjectSorting => Program::ObjectSorting,
+        }
+    }
+
+    /// How many slots its scenes have.
+    pub fn n_slots(self) -> usize {
+        8
+    }
+}
+
+/// A name that is not of the set that is asked for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown {kind} {word:?}; allowed: {allowed}")]
+pub struct UnknownName {
+    kind: &'static str,
+    word: String,
+    allowed: String,
+}
+
+impl FromStr for Family {
+    type Err = UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, UnknownName> {
+        Self::ALL.into_iter().find(|family| family.name() == word).ok_or_else(|| UnknownName {
+            kind: "task family",
+            word: word.to_owned(),
+            allowed: Self::ALL.map(Self::name).join(", "),
+        })
+    }
+}
+
+/// Whether a task may be trained on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Split {
+    /// A training task.
+    Seen,
+    /// Held out: its end configuration occurs in no training task.
+    Unseen,
+}
+
+impl Split {
+    /// Every split.
+    pub const ALL: [Self; 2] = [Self::Seen, Self::Unseen];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Seen => "seen",
+            Self::Unseen => "unseen",
+        }
+    }
+}
+
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Split {
+    type Err = UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, UnknownName> {
+        Self::ALL.into_iter().find(|split| split.name() == word).ok_or_else(|| UnknownName {
+            kind: "split",
+            word: word.to_owned(),
+            allowed: Self::ALL.map(Self::name).join(", "),
+        })
+    }
+}
+
+/// What is to be reached and in which order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// Unique in its set, e.g. `stack_0012`.
+    pub id: String,
+    /// Its kind.
+    pub family: Family,
+    /// The sub-tasks in the order of the demonstration.
+    pub goals: Vec<Goal>,
+    /// What must hold in the end.
+    pub conditions: Vec<Condition>,
+    /// Whether it may be trained on.
+    pub split: Split,
+}
+
+impl Task {
+    /// The end configuration in a form that does not depend on order: equal for two tasks exactly when they ask for
+    /// the same. The split is checked on it.
+    pub fn canonical_goal(&self) -> Vec<Condition> {
+        let mut conditions = self.conditions.clone();
+        conditions.sort_unstable();
+        conditions.dedup();
+        conditions
+    }
+
+    /// The task in a sentence.
+    pub fn text(&self) -> String {
+        let slot = |index: SlotIndex| layout::slot_name(self.family, index);
+        let part = |goal: &Goal| match self.family {
+            Family::BlockStacking => format!("put {} on {}", slot(goal.source), slot(goal.target)),
+            Family::ObjectSorting => format!("put every {} into {}", slot(goal.source), slot(goal.target)),
+        };
+        self.goals.iter().map(part).collect::<Vec<_>>().join(", then ")
+    }
+}

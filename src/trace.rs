@@ -1,0 +1,20 @@
+//! An episode as a checked value: frames, the tree of program calls, the outcome.
+//!
+//! An expert's demonstration and a policy's rollout are the same value: same writer, same viewer, same tables.
+//!
+//! # Invariants
+//!
+//! [`Episode`] can only be made by [`Episode::new`], which holds every rule of the program tree; see [`TraceError`].
+//! No file access and no physics here.
+
+mod call;
+mod episode;
+mod frame;
+mod outcome;
+mod span;
+
+pub use call::{CallId, Prediction, ProgramCall};
+pub use episode::{Actor, CallProblem, Episode, EpisodeParts, Provenance, TraceError};
+pub use frame::{Frame, Observation};
+pub use outcome::{Cause, Outcome};
+pub use span::{ScopingLabel, Span};

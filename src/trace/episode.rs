@@ -1,0 +1,321 @@
+//! The checked whole: provenance, scene, frames, calls, outcome.
+
+use std::ops::Deref;
+
+use crate::program::Program;
+use crate::scene::{Scene, SlotIndex};
+use crate::task::{Family, Split};
+use crate::trace::{CallId, Frame, Outcome, ProgramCall, Span};
+
+/// Who acted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Actor {
+    /// The scripted expert.
+    Expert,
+    /// A policy, by its variant's name (`oracle`, `ntp`, …).
+    Policy(String),
+}
+
+impl Actor {
+    /// `expert`, or the variant's name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Expert => "expert",
+            Self::Policy(variant) => variant,
+        }
+    }
+}
+
+/// Where an episode comes from: enough to simulate it again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Provenance {
+    /// Its number in its recordings, from 0.
+    pub index: u64,
+    /// The family of its task.
+    pub family: Family,
+    /// The task's id.
+    pub task_id: String,
+    /// The task in a sentence, for people and for tables of task texts.
+    pub task_text: String,
+    /// Whether the task may be trained on.
+    pub split: Split,
+    /// Which of the task's trials it is: another trial has other initial positions.
+    pub trial: u32,
+    /// The seed of the trial that was acted in the end.
+    pub seed: u64,
+    /// Instances of each category; empty where the family has none.
+    pub counts: Vec<u16>,
+    /// Who acted.
+    pub actor: Actor,
+}
+
+/// The parts of an episode before they are checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EpisodeParts {
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// What stands on the table.
+    pub scene: Scene,
+    /// At least one; times strictly increase; the first is a boundary.
+    pub frames: Vec<Frame>,
+    /// How many frames the specification has. Equal to `frames.len()` for an expert, whose episode is its own.
+    pub specification_frames: u32,
+    /// In the order of calling; the first is the root.
+    pub calls: Vec<ProgramCall>,
+    /// How it ended.
+    pub outcome: Outcome,
+}
+
+/// A checked episode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Episode(EpisodeParts);
+
+impl Deref for Episode {
+    type Target = EpisodeParts;
+
+    fn deref(&self) -> &EpisodeParts {
+        &self.0
+    }
+}
+
+/// A rule of the trace that does not hold. `call` and `frame` count from 0.
+#[expect(missing_docs, reason = "the messages say what each field is")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TraceError {
+    #[error("the episode has no frames")]
+    NoFrames,
+    #[error("the episode's first frame is not a boundary")]
+    FirstFrameInside,
+    #[error("frame {frame}: its time is not after the frame before")]
+    TimeNotIncreasing { frame: usize },
+    #[error("frame {frame}: {found} body poses, but the scene has {expected} bodies")]
+    BodyCount { frame: usize, found: usize, expected: usize },
+    #[error("frame {frame}: {found} slots, but the scene has {expected}")]
+    SlotCount { frame: usize, found: usize, expected: usize },
+    #[error("frame {frame}: slot {slot} shows body {body}, which is not one of the slot's bodies")]
+    ForeignBody { frame: usize, slot: usize, body: u16 },
+    #[error("frame {frame}: a pose is not finite")]
+    NotFinite { frame: usize },
+    #[error("the episode has no calls")]
+    NoCalls,
+    #[error("call {call}: {problem}")]
+    Call { call: u32, problem: CallProblem },
+}
+
+/// A rule of the program tree that a call breaks.
+#[expect(missing_docs, reason = "the messages say what each field is")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CallProblem {
+    #[error("its id is {found}, not its position")]
+    Misnumbered { found: u32 },
+    #[error("the first call must be a composite root without caller, and no other call may be without")]
+    Root,
+    #[error("its caller {caller} does not come before it")]
+    CallerAfter { caller: u32 },
+    #[error("its caller runs {caller}, which calls nothing")]
+    CallerIsLeaf { caller: Program },
+    #[error("its depth is {found}, but its caller's is {caller}")]
+    Depth { found: u8, caller: u8 },
+    #[error("it is step {found} of its caller, but {expected} calls came before")]
+    Step { found: u16, expected: u16 },
+    #[error("its caller had already ended")]
+    AfterEnd,
+    #[error("its caller's window is {caller:?}, but its input is {input:?}")]
+    InputIsNotCallersWindow { input: Span, caller: Option<Span> },
+    #[error("its output {output:?} does not lie inside its input {input:?}")]
+    OutputOutsideInput { input: Span, output: Span },
+    #[error("{program} and an output span do not go together as found")]
+    OutputPresence { program: Program },
+    #[error("its input reaches frame {end}, but the specification has {frames}")]
+    BeyondSpecification { end: u32, frames: u32 },
+    #[error("its frames {found:?} do not lie inside its caller's {caller:?}")]
+    FramesOutsideCaller { found: Span, caller: Span },
+    #[error("it begins at frame {begin}, before its elder sibling returned at frame {sibling}")]
+    SiblingOverlap { begin: u32, sibling: u32 },
+    #[error("{program} and argument {argument:?} do not go together")]
+    Argument { program: Program, argument: Option<SlotIndex> },
+    #[error("the composite {program} returned without ending")]
+    NotEnded { program: Program },
+}
+
+impl Episode {
+    /// Checks the parts.
+    ///
+    /// # Errors
+    ///
+    /// The first rule that does not hold. A failed episode may leave calls unended: the last ones, on the path from
+    /// the root to where it was broken off.
+    pub fn new(parts: EpisodeParts) -> Result<Self, TraceError> {
+        let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, outcome } = &parts;
+        check_frames(scene, frames)?;
+        check_calls(scene, frames.len() as u32, *specification_frames, calls, *outcome)?;
+        Ok(Self(parts))
+    }
+
+    /// Takes the parts out again.
+    pub fn into_parts(self) -> EpisodeParts {
+        self.0
+    }
+
+    /// The frames that programs see, with their positions among all frames.
+    pub fn boundary_frames(&self) -> impl Iterator<Item = (usize, &Frame)> {
+        self.frames.iter().enumerate().filter(|(_, frame)| frame.boundary)
+    }
+}
+
+fn check_frames(scene: &Scene, frames: &[Frame]) -> Result<(), TraceError> {
+    let first = frames.first().ok_or(TraceError::NoFrames)?;
+    if !first.boundary {
+        return Err(TraceError::FirstFrameInside);
+    }
+    for (frame, pair) in frames.windows(2).enumerate() {
+        if pair[1].time_nanos <= pair[0].time_nanos {
+            return Err(TraceError::TimeNotIncreasing { frame: frame + 1 });
+        }
+    }
+    frames.iter().enumerate().try_for_each(|(frame, value)| check_frame(scene, frame, value))
+}
+
+fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceError> {
+    let (n_bodies, n_slots) = (scene.bodies.len(), scene.slots.len());
+    let poses = &value.state.bodies_in_world;
+    if poses.len() != n_bodies {
+        return Err(TraceError::BodyCount { frame, found: poses.len(), expected: n_bodies });
+    }
+    if value.slots.len() != n_slots {
+        return Err(TraceError::SlotCount { frame, found: value.slots.len(), expected: n_slots });
+    }
+    let pairs = value.slots.iter().zip(&scene.slots).enumerate();
+    if let Some((slot, (body, _))) = pairs.into_iter().find(|(_, (body, slot))| !slot.bodies.contains(body)) {
+        return Err(TraceError::ForeignBody { frame, slot, body: body.0 });
+    }
+    let all_poses = poses.iter().chain([&value.state.gripper_in_world]);
+    let mut numbers = all_poses.flat_map(|pose| pose.translation.vector.iter().chain(pose.rotation.coords.iter()));
+    if numbers.any(|number| !number.is_finite()) {
+        return Err(TraceError::NotFinite { frame });
+    }
+    Ok(())
+}
+
+fn check_calls(
+    scene: &Scene,
+    n_frames: u32,
+    specification_frames: u32,
+    calls: &[ProgramCall],
+    outcome: Outcome,
+) -> Result<(), TraceError> {
+    if calls.is_empty() {
+        return Err(TraceError::NoCalls);
+    }
+    let mut progress = vec![CallProgress::default(); calls.len()];
+    for (position, call) in calls.iter().enumerate() {
+        let found = match call.caller {
+            None => check_root(position, call, n_frames, specification_frames),
+            Some(caller) => check_callee(position, call, caller, calls, &mut progress),
+        };
+        found
+            .and_then(|()| check_alone(scene, position, call))
+            .map_err(|problem| TraceError::Call { call: position as u32, problem })?;
+    }
+    if outcome.is_success() {
+        let open = calls.iter().zip(&progress).find(|(call, seen)| call.program.is_composite() && !seen.ended);
+        if let Some((call, _)) = open {
+            return Err(TraceError::Call { call: call.id.0, problem: CallProblem::NotEnded { program: call.program } });
+        }
+    }
+    Ok(())
+}
+
+/// What has been seen of a call's callees.
+#[derive(Clone, Default)]
+struct CallProgress {
+    n_callees: u16,
+    ended: bool,
+    last_return: u32,
+}
+
+fn check_root(
+    position: usize,
+    call: &ProgramCall,
+    n_frames: u32,
+    specification_frames: u32,
+) -> Result<(), CallProblem> {
+    if position != 0 || !call.program.is_composite() || call.depth != 0 || call.step != 0 || call.end_of_program {
+        return Err(CallProblem::Root);
+    }
+    if call.input.end > specification_frames {
+        return Err(CallProblem::BeyondSpecification { end: call.input.end, frames: specification_frames });
+    }
+    if call.frames.end > n_frames {
+        let caller = Span { begin: 0, end: n_frames };
+        return Err(CallProblem::FramesOutsideCaller { found: call.frames, caller });
+    }
+    Ok(())
+}
+
+fn check_callee(
+    position: usize,
+    call: &ProgramCall,
+    CallId(caller_id): CallId,
+    calls: &[ProgramCall],
+    progress: &mut [CallProgress],
+) -> Result<(), CallProblem> {
+    if caller_id as usize >= position {
+        return Err(CallProblem::CallerAfter { caller: caller_id });
+    }
+    let caller = &calls[caller_id as usize];
+    let seen = &mut progress[caller_id as usize];
+    if !caller.program.is_composite() {
+        return Err(CallProblem::CallerIsLeaf { caller: caller.program });
+    }
+    if call.depth != caller.depth.saturating_add(1) {
+        return Err(CallProblem::Depth { found: call.depth, caller: caller.depth });
+    }
+    if call.step != seen.n_callees {
+        return Err(CallProblem::Step { found: call.step, expected: seen.n_callees });
+    }
+    if seen.ended {
+        return Err(CallProblem::AfterEnd);
+    }
+    if Some(call.input) != caller.output {
+        return Err(CallProblem::InputIsNotCallersWindow { input: call.input, caller: caller.output });
+    }
+    if !caller.frames.contains(call.frames) {
+        return Err(CallProblem::FramesOutsideCaller { found: call.frames, caller: caller.frames });
+    }
+    if seen.n_callees > 0 && call.frames.begin < seen.last_return {
+        return Err(CallProblem::SiblingOverlap { begin: call.frames.begin, sibling: seen.last_return });
+    }
+    *seen = CallProgress { n_callees: seen.n_callees + 1, ended: call.end_of_program, last_return: call.frames.last() };
+    Ok(())
+}
+
+fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(), CallProblem> {
+    let ProgramCall {
+        id,
+        caller: _,
+        depth: _,
+        step: _,
+        program,
+        argument,
+        input,
+        output,
+        frames: _,
+        end_of_program,
+        prediction: _,
+    } = call;
+    if id.0 as usize != position {
+        return Err(CallProblem::Misnumbered { found: id.0 });
+    }
+    if output.is_some() == (*program == Program::None) || (*program == Program::None && !end_of_program) {
+        return Err(CallProblem::OutputPresence { program: *program });
+    }
+    if let Some(output) = output.filter(|&output| !input.contains(output)) {
+        return Err(CallProblem::OutputOutsideInput { input: *input, output });
+    }
+    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < scene.slots.len());
+    if argument.is_some() != program.takes_argument() || !in_scene {
+        return Err(CallProblem::Argument { program: *program, argument: *argument });
+    }
+    Ok(())
+}

@@ -1,0 +1,1 @@
+//! From trials in memory to trained weights: examples, batches, learner, checkpoints.

@@ -1,0 +1,1 @@
+//! Episodes into Rerun.

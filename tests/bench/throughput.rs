@@ -1,0 +1,3 @@
+//! Throughput of every stage, one JSON line each.
+
+fn main() {}
