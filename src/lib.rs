@@ -22,6 +22,7 @@ pub mod pipeline;
 pub mod recording;
 pub mod report;
 pub mod rollout;
+pub mod robot;
 pub mod sim;
 pub mod task;
 pub mod trace;

@@ -1,0 +1,67 @@
+//! The paper's robot API, as a trait that any robot in any world can implement.
+//!
+//! # Source
+//!
+//! Paper, section III: `move_to` takes an object index and moves the gripper to above that object; `grip` closes the
+//! gripper, `release` opens it.
+
+use crate::program::Program;
+use crate::scene::{Scene, SceneState, SlotIndex};
+use crate::trace::{Cause, Frame};
+
+/// A call of the robot API.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Action {
+    /// Up, across above everything that stands, and down to hover [`HOVER_M`] above what the slot shows.
+    MoveTo(SlotIndex),
+    /// Down onto what lies below, close the fingers, hold it if it is between them.
+    Grip,
+    /// Down until what is held rests on (or hangs just above) what lies below, and open the fingers.
+    Release,
+}
+
+/// Height of the gripper above the centre of the object that `move_to` names, in metres.
+pub const HOVER_M: f32 = 0.12;
+/// Height of the gripper above the centre of what it holds, in metres.
+pub const GRASP_M: f32 = 0.02;
+
+impl Action {
+    /// The action of a primitive call; `None` when program and argument are no such call.
+    pub fn new(program: Program, argument: Option<SlotIndex>) -> Option<Self> {
+        match (program, argument) {
+            (Program::MoveTo, Some(slot)) => Some(Self::MoveTo(slot)),
+            (Program::Grip, None) => Some(Self::Grip),
+            (Program::Release, None) => Some(Self::Release),
+            _ => None,
+        }
+    }
+}
+
+/// A world with a robot in it, and the record of what happened.
+pub trait RobotApi {
+    /// What stands on the table.
+    fn scene(&self) -> &Scene;
+
+    /// Where everything is now.
+    fn state(&self) -> SceneState;
+
+    /// What was recorded: the initial boundary frame, then what each action added. Each action ends with exactly one
+    /// boundary frame, the last one.
+    fn frames(&self) -> &[Frame];
+
+    /// Acts until the action has ended, well or not, and records it.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong in this action. The world goes on: a reactive policy may still recover.
+    fn act(&mut self, action: Action) -> Result<(), Cause>;
+
+    /// Lets the world come to rest without recording, to judge the outcome: the state at rest.
+    fn settle(&mut self) -> SceneState;
+
+    /// The last boundary frame: what a program sees.
+    fn now(&self) -> &Frame {
+        let frames = self.frames();
+        &frames[frames.len() - 1]
+    }
+}
