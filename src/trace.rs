@@ -11,10 +11,12 @@ mod call;
 mod episode;
 mod frame;
 mod outcome;
+mod recorder;
 mod span;
 
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, CallProblem, Episode, EpisodeParts, Provenance, TraceError};
 pub use frame::{Frame, Observation};
 pub use outcome::{Cause, Outcome};
+pub use recorder::{CallRecorder, NewCall};
 pub use span::{ScopingLabel, Span};

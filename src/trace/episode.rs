@@ -4,7 +4,8 @@ use std::ops::Deref;
 
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
-use crate::task::{Family, Split};
+use crate::seed::Seed;
+use crate::task::{Family, Split, Task, Trial};
 use crate::trace::{CallId, Frame, Outcome, ProgramCall, Span};
 
 /// Who acted.
@@ -318,4 +319,26 @@ fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(),
         return Err(CallProblem::Argument { program: *program, argument: *argument });
     }
     Ok(())
+}
+
+impl Provenance {
+    /// Of a trial of a task.
+    pub fn new(task: &Task, trial: &Trial, actor: Actor, index: u64) -> Self {
+        Self {
+            index,
+            family: task.family,
+            task_id: task.id.clone(),
+            task_text: task.text(),
+            split: task.split,
+            trial: trial.index,
+            seed: trial.seed.0,
+            counts: trial.counts.clone(),
+            actor,
+        }
+    }
+
+    /// The trial that was acted.
+    pub fn trial(&self) -> Trial {
+        Trial { index: self.trial, counts: self.counts.clone(), seed: Seed(self.seed) }
+    }
 }

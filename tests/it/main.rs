@@ -5,6 +5,7 @@ mod artifact;
 mod cli;
 mod dataset;
 mod expert;
+mod kinematic;
 mod model;
 mod pipeline;
 mod recording;
