@@ -1,5 +1,18 @@
 //! Algorithm 1 as an interpreter over a policy, closed loop in physics, many episodes at a time.
+//!
+//! # Input and output
+//!
+//! A [`Policy`] and [`Start`]s (a world and a demonstration each) give [`RolloutEpisode`]s: the same [`Episode`] value
+//! that an expert yields, and how its decisions compare with the expert's.
+//!
+//! [`Episode`]: crate::trace::Episode
 
+mod divergence;
+mod interpreter;
+mod oracle;
 mod policy;
 
+pub use divergence::{Divergence, DivergenceKind, expected_calls};
+pub use interpreter::{Limits, RolloutEpisode, Start, run};
+pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};

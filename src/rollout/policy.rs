@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::trace::{Observation, Prediction, Span};
+use crate::trace::{Episode, Observation, Prediction, Span};
 
 /// A demonstration as a policy sees it: its boundary observations.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,4 +67,21 @@ pub trait Policy {
 
     /// One decision a query, in order. Must not depend on which queries come together.
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;
+}
+
+impl Decision {
+    /// To call nothing and end.
+    pub fn end(query: &Query) -> Self {
+        Self { program: Program::None, scope: query.window, argument: None, end_of_program: true, prediction: None }
+    }
+}
+
+impl Specification {
+    /// The boundary frames of an episode.
+    pub fn of(episode: &Episode) -> Self {
+        let observations: Vec<f32> =
+            episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
+        let n_slots = episode.scene.slots.len();
+        Self { n_slots, n_frames: observations.len() / Observation::width(n_slots), observations }
+    }
 }

@@ -158,6 +158,39 @@ impl Episode {
         self.0
     }
 
+    /// The same demonstration without the frames between boundaries; spans count boundary frames then. Calls begin and
+    /// return at boundaries, so nothing of the tree is lost.
+    ///
+    /// Only an expert's episode is its own specification, so only its windows are counted anew.
+    #[must_use]
+    pub fn boundaries_only(self) -> Self {
+        let Self(mut parts) = self;
+        // How many boundaries there are up to each frame.
+        let counts: Vec<u32> = parts
+            .frames
+            .iter()
+            .scan(0, |count, frame| {
+                *count += u32::from(frame.boundary);
+                Some(*count)
+            })
+            .collect();
+        let position = |frame: u32| counts.get(frame as usize).map_or(0, |count| count - 1);
+        let moved = |span: Span| Span { begin: position(span.begin), end: position(span.last()) + 1 };
+        let own_specification = parts.provenance.actor == Actor::Expert;
+        for call in &mut parts.calls {
+            call.frames = moved(call.frames);
+            if own_specification {
+                call.input = moved(call.input);
+                call.output = call.output.map(moved);
+            }
+        }
+        parts.frames.retain(|frame| frame.boundary);
+        if own_specification {
+            parts.specification_frames = parts.frames.len() as u32;
+        }
+        Self(parts)
+    }
+
     /// The frames that programs see, with their positions among all frames.
     pub fn boundary_frames(&self) -> impl Iterator<Item = (usize, &Frame)> {
         self.frames.iter().enumerate().filter(|(_, frame)| frame.boundary)

@@ -1,1 +1,115 @@
-//! Placeholder.
+//! The interpreter, driven by the oracle.
+
+use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, expected_calls, run};
+use ntp::scene::SlotIndex;
+use ntp::task::{Split, Task};
+use ntp::trace::{Actor, Cause, Outcome, Provenance};
+
+use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
+
+fn start(task: &Task, demonstrated: u16, on_table: u16) -> Start<'_> {
+    let own_trial = trial(task, 1, on_table);
+    Start {
+        task,
+        demonstration: demonstration(task, &trial(task, 0, demonstrated), 0),
+        world: Box::new(KinematicWorld::new(task.family, &own_trial)),
+        provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 0),
+    }
+}
+
+fn oracle_for(starts: &[Start<'_>]) -> Oracle {
+    let expected =
+        |start: &Start<'_>| expected_calls(&start.demonstration, start.world.scene()).into_iter().cloned().collect();
+    Oracle::new(starts.iter().map(expected).collect())
+}
+
+fn check_oracle(starts: Vec<Start<'_>>) -> Vec<RolloutEpisode> {
+    let mut oracle = oracle_for(&starts);
+    let rollouts = run(&mut oracle, starts, Limits::default()).unwrap();
+    for rollout in &rollouts {
+        assert_eq!(rollout.episode.outcome, Outcome::Success);
+        assert_eq!(rollout.first_divergence, None);
+    }
+    rollouts
+}
+
+#[test]
+fn an_oracle_succeeds_at_stacking_and_sorting_side_by_side() {
+    let (stacking, map) = (tower("t", &[4, 1, 6, 2], Split::Unseen), sorting("m", [0, 2, 2, 1], Split::Unseen));
+    let rollouts = check_oracle(vec![start(&stacking, 1, 1), start(&map, 2, 2), start(&stacking, 1, 1)]);
+    assert_eq!(rollouts[0].decisions, 7 * 3 + 1);
+}
+
+#[test]
+fn an_oracle_sorts_more_objects_than_were_demonstrated() {
+    let map = sorting("m", [3, 0, 2, 2], Split::Unseen);
+    let rollouts = check_oracle(vec![start(&map, 1, 4)]);
+    assert_eq!(rollouts[0].decisions, 7 * 16 + 1);
+}
+
+/// Calls the wrong thing at one decision.
+struct Spoiled<P> {
+    inner: P,
+    at: u32,
+    spoil: fn(&Query, &mut Decision),
+}
+
+impl<P: Policy> Policy for Spoiled<P> {
+    fn name(&self) -> &str {
+        "spoiled"
+    }
+
+    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+        let mut decisions = self.inner.decide(queries);
+        for (query, decision) in queries.iter().zip(&mut decisions) {
+            if query.decision == self.at {
+                (self.spoil)(query, decision);
+            }
+        }
+        decisions
+    }
+}
+
+fn check_spoiled(at: u32, spoil: fn(&Query, &mut Decision)) -> RolloutEpisode {
+    let task = tower("t", &[4, 1, 6], Split::Unseen);
+    let starts = vec![start(&task, 1, 1)];
+    let mut policy = Spoiled { inner: oracle_for(&starts), at, spoil };
+    run(&mut policy, starts, Limits::default()).unwrap().remove(0)
+}
+
+#[test]
+fn a_wrong_argument_is_the_first_divergence_and_fails_the_goal() {
+    let rollout = check_spoiled(2, |_, decision| decision.argument = Some(SlotIndex(7)));
+    let divergence = rollout.first_divergence.unwrap();
+    assert_eq!((divergence.decision, divergence.kind.name()), (2, "argument"));
+    assert_eq!(rollout.episode.outcome, Outcome::Failure(Cause::EndedEarly));
+}
+
+#[test]
+fn an_early_end_of_the_root_is_a_failure_although_nothing_went_wrong_before() {
+    let rollout = check_spoiled(7, |query, decision| *decision = Decision::end(query));
+    assert_eq!(rollout.first_divergence.unwrap().kind.name(), "program");
+    assert_eq!(rollout.episode.outcome, Outcome::Failure(Cause::EndedEarly));
+}
+
+#[test]
+fn a_policy_that_never_ends_is_stopped() {
+    struct Endless;
+    impl Policy for Endless {
+        fn name(&self) -> &str {
+            "endless"
+        }
+        fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+            let go_on = |query: &Query| Decision {
+                program: ntp::program::Program::MoveTo,
+                argument: Some(SlotIndex(0)),
+                end_of_program: false,
+                ..Decision::end(query)
+            };
+            queries.iter().map(go_on).collect()
+        }
+    }
+    let task = tower("t", &[4, 1], Split::Unseen);
+    let rollouts = run(&mut Endless, vec![start(&task, 1, 1)], Limits::default()).unwrap();
+    assert_eq!(rollouts[0].episode.outcome, Outcome::Failure(Cause::NeverEnded));
+}

@@ -1,0 +1,98 @@
+//! What the expert would decide in an episode, and where a policy first differs.
+
+use crate::program::Program;
+use crate::scene::{Scene, SlotIndex};
+use crate::trace::{CallId, Episode, ProgramCall};
+
+/// How a decision differs from the expert's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum DivergenceKind {
+    /// Another program was called.
+    Program,
+    /// The same with another argument.
+    Argument,
+    /// The same on another part of the demonstration.
+    Scope,
+    /// The same, but the caller ended early or late.
+    End,
+}
+
+impl DivergenceKind {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Program => "program",
+            Self::Argument => "argument",
+            Self::Scope => "scope",
+            Self::End => "end",
+        }
+    }
+}
+
+/// The first decision that differs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Divergence {
+    /// Number of the decision in the episode, from 0.
+    pub decision: u32,
+    /// How it differs.
+    pub kind: DivergenceKind,
+    /// The program that decided.
+    pub program: Program,
+}
+
+/// The calls an expert makes to repeat a demonstration in a scene, without the root's: every sub-task once for each
+/// body that its source shows, on the *first* part of the demonstration that shows such a sub-task. That part is a
+/// function of what is seen, the k-th of several alike is not.
+pub fn expected_calls<'d>(demonstration: &'d Episode, scene: &Scene) -> Vec<&'d ProgramCall> {
+    let calls = &demonstration.calls;
+    let mut expected = Vec::new();
+    let mut seen: Vec<Vec<SlotIndex>> = Vec::new();
+    for (position, call) in calls.iter().enumerate().filter(|(_, call)| call.caller == Some(CallId(0))) {
+        let subtree = subtree(calls, position);
+        let arguments: Vec<SlotIndex> = subtree.iter().filter_map(|call| call.argument).collect();
+        if call.program == Program::None {
+            expected.push(call);
+        } else if !seen.contains(&arguments) {
+            let times = arguments.first().map_or(1, |&source| scene.slot(source).bodies.len());
+            expected.extend((0..times).flat_map(|_| subtree));
+            seen.push(arguments);
+        }
+    }
+    expected
+}
+
+/// A call and all below it, which follow it in the order of calling.
+fn subtree(calls: &[ProgramCall], position: usize) -> &[ProgramCall] {
+    let depth = calls[position].depth;
+    let after = calls[position + 1..].iter().position(|call| call.depth <= depth);
+    &calls[position..after.map_or(calls.len(), |n_below| position + 1 + n_below)]
+}
+
+/// Where `calls` (the root's first) leave what is expected.
+pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall]) -> Option<Divergence> {
+    let decided = calls.iter().skip(1);
+    let differing = decided.enumerate().find_map(|(decision, call)| {
+        let kind = match expected.get(decision) {
+            Some(wanted) => difference(call, wanted),
+            None => Some(DivergenceKind::End),
+        };
+        kind.map(|kind| (decision, call, kind))
+    });
+    let (decision, call, kind) = differing?;
+    let caller = call.caller.map_or(call.program, |caller| calls[caller.0 as usize].program);
+    Some(Divergence { decision: decision as u32, kind, program: caller })
+}
+
+fn difference(call: &ProgramCall, wanted: &ProgramCall) -> Option<DivergenceKind> {
+    if call.program != wanted.program {
+        Some(DivergenceKind::Program)
+    } else if call.argument != wanted.argument {
+        Some(DivergenceKind::Argument)
+    } else if call.program.is_composite() && call.output != wanted.output {
+        Some(DivergenceKind::Scope)
+    } else if call.end_of_program != wanted.end_of_program {
+        Some(DivergenceKind::End)
+    } else {
+        None
+    }
+}

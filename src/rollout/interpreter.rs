@@ -1,0 +1,178 @@
+//! Algorithm 1 of the paper, with a call stack in place of recursion so that many episodes ask a policy at once.
+//!
+//! A step whose program ends is a tail call: the caller returns together with its last callee. That is what
+//! Algorithm 1 does, whose loop tests `r` only after the call.
+
+use std::sync::Arc;
+
+use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
+
+use crate::program::Program;
+use crate::robot::{Action, RobotApi};
+use crate::rollout::divergence::first_divergence;
+use crate::rollout::{Decision, Divergence, Policy, Query, Specification, expected_calls};
+use crate::task::{Task, goal_holds};
+use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, ProgramCall, Provenance, TraceError};
+
+/// An episode about to be acted: a demonstration, and a world of another trial.
+pub struct Start<'t> {
+    /// What is to be reached; the policy never sees it.
+    pub task: &'t Task,
+    /// The expert's episode of another trial of the task; boundary frames alone or all.
+    pub demonstration: Episode,
+    /// The world to act in.
+    pub world: Box<dyn RobotApi + Send>,
+    /// Where the new episode comes from.
+    pub provenance: Provenance,
+}
+
+/// When a rollout is given up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Decisions allowed, as a multiple of what the expert needs.
+    pub decisions_factor: f32,
+    /// Deepest stack of running programs.
+    pub max_depth: u8,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { decisions_factor: 3.0, max_depth: 8 }
+    }
+}
+
+/// An acted episode and how it compares with the expert.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RolloutEpisode {
+    /// The episode; its specification is the demonstration's boundary frames.
+    pub episode: Episode,
+    /// How many decisions the policy made.
+    pub decisions: u32,
+    /// The first that differs from the expert's; `None` when none does.
+    pub first_divergence: Option<Divergence>,
+}
+
+/// Acts all episodes to their ends. Physics of different episodes runs on the current rayon pool; the result does not
+/// depend on its size.
+///
+/// # Errors
+///
+/// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
+pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
+    let mut running: Vec<Running<'_>> = starts.into_iter().map(|start| Running::new(start, limits)).collect();
+    loop {
+        let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
+        if queries.is_empty() {
+            break;
+        }
+        let decisions = policy.decide(&queries);
+        for (query, decision) in queries.iter().zip(decisions) {
+            running[query.episode].pending = Some(decision);
+        }
+        running.par_iter_mut().for_each(Running::step);
+    }
+    let variant = policy.name().to_owned();
+    running.into_iter().map(|run| run.finish(&variant)).collect()
+}
+
+/// One episode on its way.
+struct Running<'t> {
+    task: &'t Task,
+    world: Box<dyn RobotApi + Send>,
+    provenance: Provenance,
+    specification: Arc<Specification>,
+    expected: Vec<ProgramCall>,
+    calls: CallRecorder,
+    pending: Option<Decision>,
+    max_decisions: u32,
+    max_depth: u8,
+    decisions: u32,
+    first_cause: Option<Cause>,
+    gave_up: bool,
+}
+
+impl<'t> Running<'t> {
+    fn new(start: Start<'t>, limits: Limits) -> Self {
+        let Start { task, demonstration, world, provenance } = start;
+        let demonstration = demonstration.boundaries_only();
+        let expected: Vec<ProgramCall> = expected_calls(&demonstration, world.scene()).into_iter().cloned().collect();
+        let specification = Arc::new(Specification::of(&demonstration));
+        Self {
+            task,
+            world,
+            provenance,
+            calls: CallRecorder::new(task.family.root_program(), specification.whole()),
+            specification,
+            pending: None,
+            max_decisions: (expected.len() as f32 * limits.decisions_factor) as u32 + 20,
+            max_depth: limits.max_depth,
+            expected,
+            decisions: 0,
+            first_cause: None,
+            gave_up: false,
+        }
+    }
+
+    /// What to ask the policy now; nothing when the episode is over.
+    fn query(&self, episode: usize) -> Option<Query> {
+        let top = self.calls.top().filter(|_| !self.gave_up)?;
+        Some(Query {
+            episode,
+            decision: self.decisions,
+            depth: top.depth,
+            step: self.calls.steps_of_top(),
+            specification: Arc::clone(&self.specification),
+            window: top.output.unwrap_or(top.input),
+            program: top.program,
+            observation: self.world.now().observation(),
+        })
+    }
+
+    /// Carries out the pending decision.
+    fn step(&mut self) {
+        let Some(decision) = self.pending.take() else { return };
+        self.decisions += 1;
+        let Decision { program, scope, argument, end_of_program, prediction } = decision;
+        let scope = (program != Program::None).then_some(scope);
+        let new = NewCall { program, argument, scope, end_of_program, prediction };
+        self.calls.call(new, self.frame());
+        if let Some(action) = Action::new(program, argument) {
+            if let Err(cause) = self.world.act(action) {
+                self.first_cause.get_or_insert(cause);
+            }
+        }
+        if !program.is_composite() {
+            self.calls.returned(self.frame());
+        }
+        let too_deep = self.calls.top().is_some_and(|top| top.depth >= self.max_depth);
+        self.gave_up = self.calls.top().is_some() && (self.decisions >= self.max_decisions || too_deep);
+    }
+
+    fn frame(&self) -> u32 {
+        (self.world.frames().len() as u32).saturating_sub(1)
+    }
+
+    fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
+        let at_rest = self.world.settle();
+        let reached = goal_holds(self.world.scene(), &at_rest, &self.task.conditions);
+        let outcome = match (self.gave_up, reached) {
+            (false, true) => Outcome::Success,
+            (false, false) => Outcome::Failure(self.first_cause.unwrap_or(Cause::EndedEarly)),
+            (true, _) => Outcome::Failure(self.first_cause.unwrap_or(Cause::NeverEnded)),
+        };
+        let frame = self.frame();
+        let calls = self.calls.finish(frame);
+        let expected: Vec<&ProgramCall> = self.expected.iter().collect();
+        let first_divergence = first_divergence(&calls, &expected);
+        self.provenance.actor = crate::trace::Actor::Policy(variant.to_owned());
+        let episode = Episode::new(EpisodeParts {
+            provenance: self.provenance,
+            scene: self.world.scene().clone(),
+            frames: self.world.frames().to_vec(),
+            specification_frames: self.specification.n_frames as u32,
+            calls,
+            outcome,
+        })?;
+        Ok(RolloutEpisode { episode, decisions: self.decisions, first_divergence })
+    }
+}
