@@ -149,7 +149,7 @@ impl Episode {
     pub fn new(parts: EpisodeParts) -> Result<Self, TraceError> {
         let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, outcome } = &parts;
         check_frames(scene, frames)?;
-        check_calls(scene, frames.len() as u32, *specification_frames, calls, *outcome)?;
+        check_calls(scene.slots.len(), frames.len() as u32, *specification_frames, calls, *outcome)?;
         Ok(Self(parts))
     }
 
@@ -231,8 +231,13 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
     Ok(())
 }
 
-fn check_calls(
-    scene: &Scene,
+/// Holds every rule of the program tree, for calls among `n_frames` frames whose arguments are among `n_slots` slots.
+///
+/// # Errors
+///
+/// The first rule that does not hold.
+pub fn check_calls(
+    n_slots: usize,
     n_frames: u32,
     specification_frames: u32,
     calls: &[ProgramCall],
@@ -248,7 +253,7 @@ fn check_calls(
             Some(caller) => check_callee(position, call, caller, calls, &mut progress),
         };
         found
-            .and_then(|()| check_alone(scene, position, call))
+            .and_then(|()| check_alone(n_slots, position, call))
             .map_err(|problem| TraceError::Call { call: position as u32, problem })?;
     }
     if outcome.is_success() {
@@ -324,7 +329,7 @@ fn check_callee(
     Ok(())
 }
 
-fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(), CallProblem> {
+fn check_alone(n_slots: usize, position: usize, call: &ProgramCall) -> Result<(), CallProblem> {
     let ProgramCall {
         id,
         caller: _,
@@ -347,7 +352,7 @@ fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(),
     if let Some(output) = output.filter(|&output| !input.contains(output)) {
         return Err(CallProblem::OutputOutsideInput { input: *input, output });
     }
-    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < scene.slots.len());
+    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < n_slots);
     if argument.is_some() != program.takes_argument() || !in_scene {
         return Err(CallProblem::Argument { program: *program, argument: *argument });
     }
