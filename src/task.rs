@@ -5,14 +5,17 @@
 //! Drawn from a seed or imported from the authors' task file; written as `tasks.json` (schemas/tasks.schema.json).
 //! The split is decided here and nowhere else.
 
+mod check;
+mod file;
 mod goal;
 mod import;
 mod layout;
 mod sampler;
 mod set;
 
+pub use file::TaskFileError;
 pub use goal::{Condition, Goal, condition_holds, goal_holds};
-pub use import::{ImportError, import};
+pub use import::{ImportError, ImportProblem, import};
 pub use layout::{Trial, initial_state, scene};
 pub use sampler::{SampleError, sample};
 pub use set::{TaskSet, TaskSetError};

@@ -15,7 +15,7 @@ mod recorder;
 mod span;
 
 pub use call::{CallId, Prediction, ProgramCall};
-pub use episode::{Actor, CallProblem, Episode, EpisodeParts, Provenance, TraceError};
+pub use episode::{Actor, CallProblem, Episode, EpisodeParts, Provenance, TraceError, check_calls};
 pub use frame::{Frame, Observation};
 pub use outcome::{Cause, Outcome};
 pub use recorder::{CallRecorder, NewCall};

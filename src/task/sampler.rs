@@ -1,18 +1,55 @@
 //! Draws the tasks of a family.
+//!
+//! # Invariants
+//!
+//! A task depends on the seed and on its place in its split alone. So the first 20 of 1000 training tasks are the 20
+//! training tasks of a smaller experiment, and every experiment of one seed is measured on the same unseen tasks.
+
+mod sorting;
+mod stacking;
 
 use crate::seed::Seed;
-use crate::task::{Family, TaskSet};
+use crate::task::check::condition_of;
+use crate::task::{Family, Goal, Split, Task, TaskSet};
 
 /// Fewer tasks can be drawn than asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("placeholder")]
-pub struct SampleError;
+#[error("{} has at most {limit} {split} tasks to draw, {asked} were asked for", family.name())]
+pub struct SampleError {
+    /// Of which family.
+    pub family: Family,
+    /// In which split.
+    pub split: Split,
+    /// How many were asked for.
+    pub asked: u32,
+    /// How many there are.
+    pub limit: u32,
+}
 
-/// Draws tasks.
+/// Draws tasks with distinct end configurations: `train` of them to train on, then `unseen` held-out ones.
 ///
 /// # Errors
 ///
-/// When there are not as many distinct tasks.
-pub fn sample(_family: Family, _train: u32, _unseen: u32, _seed: Seed) -> Result<TaskSet, SampleError> {
-    Err(SampleError)
+/// When there are not as many.
+pub fn sample(family: Family, train: u32, unseen: u32, seed: Seed) -> Result<TaskSet, SampleError> {
+    let (train_limit, unseen_limit) = match family {
+        Family::BlockStacking => (stacking::split_limit(), stacking::split_limit()),
+        Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
+    };
+    for (split, asked, limit) in [(Split::Seen, train, train_limit), (Split::Unseen, unseen, unseen_limit)] {
+        if asked > limit {
+            return Err(SampleError { family, split, asked, limit });
+        }
+    }
+    let tasks = match family {
+        Family::BlockStacking => stacking::sample(train as usize, unseen as usize, seed),
+        Family::ObjectSorting => sorting::sample(train as usize, unseen as usize, seed),
+    };
+    Ok(TaskSet { family, tasks })
+}
+
+/// A task whose conditions are what its goals bring about.
+fn task(id: String, family: Family, goals: Vec<Goal>, split: Split) -> Task {
+    let conditions = goals.iter().map(|&goal| condition_of(family, goal)).collect();
+    Task { id, family, goals, conditions, split }
 }

@@ -97,6 +97,10 @@ pub enum TraceError {
     ForeignBody { frame: usize, slot: usize, body: u16 },
     #[error("frame {frame}: a pose is not finite")]
     NotFinite { frame: usize },
+    #[error("frame {frame}: body {body} is held, but the scene has {bodies} bodies")]
+    HeldBody { frame: usize, body: u16, bodies: usize },
+    #[error("slot {slot} may show body {body}, but the scene has {bodies} bodies")]
+    SlotBody { slot: usize, body: u16, bodies: usize },
     #[error("the episode has no calls")]
     NoCalls,
     #[error("call {call}: {problem}")]
@@ -148,8 +152,9 @@ impl Episode {
     /// the root to where it was broken off.
     pub fn new(parts: EpisodeParts) -> Result<Self, TraceError> {
         let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, outcome } = &parts;
+        check_slots(scene)?;
         check_frames(scene, frames)?;
-        check_calls(scene, frames.len() as u32, *specification_frames, calls, *outcome)?;
+        check_calls(scene.slots.len(), frames.len() as u32, *specification_frames, calls, *outcome)?;
         Ok(Self(parts))
     }
 
@@ -197,6 +202,16 @@ impl Episode {
     }
 }
 
+fn check_slots(scene: &Scene) -> Result<(), TraceError> {
+    let n_bodies = scene.bodies.len();
+    for (slot, value) in scene.slots.iter().enumerate() {
+        if let Some(body) = value.bodies.iter().find(|body| usize::from(body.0) >= n_bodies) {
+            return Err(TraceError::SlotBody { slot, body: body.0, bodies: n_bodies });
+        }
+    }
+    Ok(())
+}
+
 fn check_frames(scene: &Scene, frames: &[Frame]) -> Result<(), TraceError> {
     let first = frames.first().ok_or(TraceError::NoFrames)?;
     if !first.boundary {
@@ -223,6 +238,9 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
     if let Some((slot, (body, _))) = pairs.into_iter().find(|(_, (body, slot))| !slot.bodies.contains(body)) {
         return Err(TraceError::ForeignBody { frame, slot, body: body.0 });
     }
+    if let Some(body) = value.state.held.filter(|body| usize::from(body.0) >= n_bodies) {
+        return Err(TraceError::HeldBody { frame, body: body.0, bodies: n_bodies });
+    }
     let all_poses = poses.iter().chain([&value.state.gripper_in_world]);
     let mut numbers = all_poses.flat_map(|pose| pose.translation.vector.iter().chain(pose.rotation.coords.iter()));
     if numbers.any(|number| !number.is_finite()) {
@@ -231,8 +249,13 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
     Ok(())
 }
 
-fn check_calls(
-    scene: &Scene,
+/// Holds every rule of the program tree, for calls among `n_frames` frames whose arguments are among `n_slots` slots.
+///
+/// # Errors
+///
+/// The first rule that does not hold.
+pub fn check_calls(
+    n_slots: usize,
     n_frames: u32,
     specification_frames: u32,
     calls: &[ProgramCall],
@@ -248,7 +271,7 @@ fn check_calls(
             Some(caller) => check_callee(position, call, caller, calls, &mut progress),
         };
         found
-            .and_then(|()| check_alone(scene, position, call))
+            .and_then(|()| check_alone(n_slots, position, call))
             .map_err(|problem| TraceError::Call { call: position as u32, problem })?;
     }
     if outcome.is_success() {
@@ -324,7 +347,7 @@ fn check_callee(
     Ok(())
 }
 
-fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(), CallProblem> {
+fn check_alone(n_slots: usize, position: usize, call: &ProgramCall) -> Result<(), CallProblem> {
     let ProgramCall {
         id,
         caller: _,
@@ -347,7 +370,7 @@ fn check_alone(scene: &Scene, position: usize, call: &ProgramCall) -> Result<(),
     if let Some(output) = output.filter(|&output| !input.contains(output)) {
         return Err(CallProblem::OutputOutsideInput { input: *input, output });
     }
-    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < scene.slots.len());
+    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < n_slots);
     if argument.is_some() != program.takes_argument() || !in_scene {
         return Err(CallProblem::Argument { program: *program, argument: *argument });
     }

@@ -71,10 +71,15 @@ impl KinematicWorld {
         let half_height = self.scene.body(held).shape.half_extents_m().z;
         let jitter = |rng: &mut ChaCha8Rng| rng.random_range(-0.003..0.003_f32);
         let xy = self.gripper() + Vec3::new(jitter(&mut self.rng), jitter(&mut self.rng), 0.0);
-        let floor = self.below(0.03).map_or(0.0, |body| match self.scene.body(body).shape {
-            Shape::OpenBox { .. } => self.position(body).z,
-            shape => self.position(body).z + shape.half_extents_m().z,
+        let container = self.scene.body_indices().find(|&body| {
+            let is_container = matches!(self.scene.body(body).shape, Shape::OpenBox { .. });
+            is_container && horizontal_distance(&self.position(body), &xy) < 0.05
         });
+        let floor = match (container, self.below(0.03)) {
+            (Some(container), _) => self.position(container).z,
+            (None, Some(body)) => self.position(body).z + self.scene.body(body).shape.half_extents_m().z,
+            (None, None) => 0.0,
+        };
         self.set_gripper(Vec3::new(xy.x, xy.y, floor + half_height + GRASP_M));
         self.state.held = None;
         self.state.opening_m = 0.07;

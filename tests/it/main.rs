@@ -13,6 +13,7 @@ mod report;
 mod rollout;
 mod schemas;
 mod sim;
+mod table;
 mod task;
 mod trace;
 mod visualize;

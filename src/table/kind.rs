@@ -1,0 +1,106 @@
+//! What a column holds, as a word for messages and as what Parquet's type says.
+
+use std::fmt;
+
+use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as PhysicalType};
+use parquet::schema::types::Type;
+
+/// What one value is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// A signed 64-bit number.
+    Int64,
+    /// A 32-bit float.
+    Float32,
+    /// A 64-bit float.
+    Float64,
+    /// True or false.
+    Boolean,
+    /// UTF-8.
+    Text,
+}
+
+/// How many values a row has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// One.
+    Required,
+    /// One or none.
+    Optional,
+    /// Any number, in order.
+    List,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColumnKind {
+    /// What one value is.
+    pub value: Value,
+    /// How many values a row has.
+    pub form: Form,
+}
+
+impl ColumnKind {
+    /// The kind that a Parquet field has; `None` for the many that no table of ours uses.
+    pub(crate) fn of(field: &Type) -> Option<Self> {
+        if field.is_primitive() {
+            let form = match field.get_basic_info().repetition() {
+                Repetition::REQUIRED => Form::Required,
+                Repetition::OPTIONAL => Form::Optional,
+                Repetition::REPEATED => return None,
+            };
+            return Some(Self { value: value_of(field)?, form });
+        }
+        let is_list = field.get_basic_info().converted_type() == ConvertedType::LIST
+            || matches!(field.get_basic_info().logical_type_ref(), Some(LogicalType::List));
+        let [list] = field.get_fields() else { return None };
+        if !is_list || !list.is_group() {
+            return None;
+        }
+        let [element] = list.get_fields() else { return None };
+        element.is_primitive().then(|| value_of(element)).flatten().map(|value| Self { value, form: Form::List })
+    }
+
+    /// Whether a column of this kind can be read where `expected` is asked for: values are of the same type, and a
+    /// column that may be null may still hold none.
+    pub(crate) fn can_be_read_as(self, expected: Self) -> bool {
+        self.value == expected.value && (self.form == Form::List) == (expected.form == Form::List)
+    }
+}
+
+fn value_of(field: &Type) -> Option<Value> {
+    let info = field.get_basic_info();
+    let plain = info.logical_type_ref().is_none() && info.converted_type() == ConvertedType::NONE;
+    let text =
+        matches!(info.logical_type_ref(), Some(LogicalType::String)) || info.converted_type() == ConvertedType::UTF8;
+    match field.get_physical_type() {
+        PhysicalType::INT64 if plain => Some(Value::Int64),
+        PhysicalType::FLOAT if plain => Some(Value::Float32),
+        PhysicalType::DOUBLE if plain => Some(Value::Float64),
+        PhysicalType::BOOLEAN if plain => Some(Value::Boolean),
+        PhysicalType::BYTE_ARRAY if text => Some(Value::Text),
+        _ => None,
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Int64 => "int64",
+            Self::Float32 => "float32",
+            Self::Float64 => "float64",
+            Self::Boolean => "boolean",
+            Self::Text => "text",
+        })
+    }
+}
+
+impl fmt::Display for ColumnKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.form {
+            Form::Required => write!(f, "{}", self.value),
+            Form::Optional => write!(f, "optional {}", self.value),
+            Form::List => write!(f, "list of {}", self.value),
+        }
+    }
+}

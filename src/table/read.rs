@@ -1,0 +1,216 @@
+//! Reading: whole tables, or in batches so that memory does not grow with the file.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
+use arrow::datatypes::{ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::file::metadata::ParquetMetaData;
+
+use crate::artifact::IoError;
+use crate::table::guard::guarded;
+use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
+
+/// Rows of one batch.
+const BATCH_ROWS: usize = 8192;
+
+/// Reads a whole table: the schema's columns, in its order. Other columns are passed over.
+///
+/// # Errors
+///
+/// When the file is not there, is truncated or corrupted, or lacks a column that the schema has.
+pub fn read(path: &Path, schema: &TableSchema) -> Result<Columns, TableError> {
+    let names: Vec<String> = schema.columns()?.into_iter().map(|(name, _)| name).collect();
+    let mut reader = TableReader::open_columns(path, schema, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
+    let mut columns = reader.empty_columns();
+    while reader.append_batch(&mut columns)? {}
+    Ok(Columns::new(path, schema.name(), columns))
+}
+
+/// Reads a table in batches of some thousand rows.
+pub struct TableReader {
+    path: PathBuf,
+    schema: &'static str,
+    columns: Vec<(String, ColumnKind)>,
+    reader: ParquetRecordBatchReader,
+    n_rows: u64,
+    rows_read: u64,
+}
+
+impl TableReader {
+    /// Opens some columns of a table.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`].
+    pub fn open_columns(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
+        guarded(path, || Self::open_unguarded(path, schema, names))
+    }
+
+    fn open_unguarded(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
+        let parsed = schema.parse()?;
+        let named = |name: &&str| parsed.columns.iter().find(|(column, _)| column == name).cloned();
+        let columns: Vec<_> = names.iter().filter_map(named).collect();
+        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder =
+            ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
+        let roots = find_roots(path, schema.name(), &columns, builder.metadata())?;
+        let n_rows = builder.metadata().file_metadata().num_rows().max(0) as u64;
+        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
+        let reader =
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(TableError::parquet(path))?;
+        Ok(Self { path: path.to_owned(), schema: schema.name(), columns, reader, n_rows, rows_read: 0 })
+    }
+
+    /// Rows of the file, as its footer says.
+    pub fn n_rows(&self) -> u64 {
+        self.n_rows
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn empty_columns(&self) -> Vec<(String, Column)> {
+        self.columns.iter().filter_map(|(name, kind)| Some((name.clone(), Column::empty(*kind)?))).collect()
+    }
+
+    /// Appends the next batch; false at the end.
+    fn append_batch(&mut self, columns: &mut [(String, Column)]) -> Result<bool, TableError> {
+        let first_row = self.rows_read;
+        let Some(batch) = self.next_batch()? else { return Ok(false) };
+        for (name, column) in columns {
+            self.append(name, column, &batch, first_row)?;
+        }
+        Ok(true)
+    }
+
+    /// The next batch as Arrow arrays; nulls are not yet looked for.
+    pub(crate) fn next_batch(&mut self) -> Result<Option<RecordBatch>, TableError> {
+        let (path, reader) = (&self.path, &mut self.reader);
+        let batch = guarded(path, || reader.next().transpose().map_err(TableError::arrow(path)))?;
+        self.rows_read += batch.as_ref().map_or(0, |batch| batch.num_rows() as u64);
+        Ok(batch)
+    }
+
+    fn append(&self, name: &str, column: &mut Column, batch: &RecordBatch, first_row: u64) -> Result<(), TableError> {
+        let expected = column.kind();
+        let wrong = |found: String| TableError::ColumnKind {
+            path: self.path.clone(),
+            schema: self.schema,
+            column: name.to_owned(),
+            expected: expected.to_string(),
+            found,
+        };
+        let array = batch.column_by_name(name).ok_or_else(|| wrong("missing".to_owned()))?;
+        if let Some(row) = first_null(array, expected) {
+            return Err(TableError::Null {
+                path: self.path.clone(),
+                schema: self.schema,
+                column: name.to_owned(),
+                row: first_row + row as u64,
+            });
+        }
+        append_array(column, array).ok_or_else(|| wrong(array.data_type().to_string()))
+    }
+}
+
+impl Iterator for TableReader {
+    type Item = Result<Columns, TableError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut columns = self.empty_columns();
+        match self.append_batch(&mut columns) {
+            Ok(true) => Some(Ok(Columns::new(&self.path, self.schema, columns))),
+            Ok(false) => None,
+            Err(error) => Some(Err(error)),
+        }
+    }
+}
+
+/// Positions of the wanted columns among the file's.
+fn find_roots(
+    path: &Path,
+    schema: &'static str,
+    columns: &[(String, ColumnKind)],
+    metadata: &ParquetMetaData,
+) -> Result<Vec<usize>, TableError> {
+    let fields = metadata.file_metadata().schema().get_fields();
+    let find = |(name, expected): &(String, ColumnKind)| {
+        let position = fields.iter().position(|field| field.name() == name);
+        let Some(position) = position else {
+            return Err(TableError::MissingColumn {
+                path: path.to_owned(),
+                schema,
+                column: name.clone(),
+                expected: expected.to_string(),
+            });
+        };
+        let found = ColumnKind::of(&fields[position]);
+        if found.is_some_and(|found| found.can_be_read_as(*expected)) {
+            return Ok(position);
+        }
+        Err(TableError::ColumnKind {
+            path: path.to_owned(),
+            schema,
+            column: name.clone(),
+            expected: expected.to_string(),
+            found: found.map_or_else(|| "of another kind".to_owned(), |found| found.to_string()),
+        })
+    };
+    columns.iter().map(find).collect()
+}
+
+/// The first row without a value, where there must be one.
+fn first_null(array: &ArrayRef, expected: ColumnKind) -> Option<usize> {
+    let null_row =
+        |array: &dyn Array| (array.null_count() > 0).then(|| (0..array.len()).find(|&row| array.is_null(row)));
+    match expected.form {
+        Form::Optional => None,
+        Form::Required => null_row(array).flatten(),
+        Form::List => null_row(array).flatten().or_else(|| {
+            let list = array.as_list_opt::<i32>()?;
+            let value = null_row(list.values()).flatten()?;
+            list.offsets().windows(2).position(|ends| (ends[0]..ends[1]).contains(&(value as i32)))
+        }),
+    }
+}
+
+fn append_array(column: &mut Column, array: &ArrayRef) -> Option<()> {
+    match column {
+        Column::Int64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Int64Type>()?.values()),
+        Column::OptionalInt64(rows) => rows.extend(array.as_primitive_opt::<Int64Type>()?),
+        Column::Float32(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float32Type>()?.values()),
+        Column::OptionalFloat32(rows) => rows.extend(array.as_primitive_opt::<Float32Type>()?),
+        Column::Float64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float64Type>()?.values()),
+        Column::OptionalFloat64(rows) => rows.extend(array.as_primitive_opt::<Float64Type>()?),
+        Column::Boolean(rows) => rows.extend(array.as_boolean_opt()?.values()),
+        Column::Text(rows) => {
+            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.unwrap_or_default().to_owned()));
+        }
+        Column::OptionalText(rows) => {
+            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.map(ToOwned::to_owned)));
+        }
+        Column::Int64List(rows) => append_list::<Int64Type>(rows, array)?,
+        Column::Float32List(rows) => append_list::<Float32Type>(rows, array)?,
+        Column::Float64List(rows) => append_list::<Float64Type>(rows, array)?,
+        Column::TextList(rows) => {
+            let list = array.as_list_opt::<i32>()?;
+            let values = list.values().as_string_opt::<i32>()?;
+            let row = |ends: &[i32]| (ends[0]..ends[1]).map(|at| values.value(at as usize).to_owned()).collect();
+            rows.extend(list.offsets().windows(2).map(row));
+        }
+    }
+    Some(())
+}
+
+fn append_list<T: ArrowPrimitiveType>(rows: &mut Vec<Vec<T::Native>>, array: &ArrayRef) -> Option<()> {
+    let list = array.as_list_opt::<i32>()?;
+    let values = list.values().as_primitive_opt::<T>()?.values();
+    rows.extend(list.offsets().windows(2).map(|ends| values[ends[0] as usize..ends[1] as usize].to_vec()));
+    Some(())
+}

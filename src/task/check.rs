@@ -1,0 +1,149 @@
+//! The rules of a task set, one function a rule.
+
+use std::collections::BTreeMap;
+
+use crate::scene::SlotIndex;
+use crate::task::layout::slot_name;
+use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
+
+/// How many slots of Object Sorting are categories; the others are containers.
+pub(super) const N_CATEGORIES: u16 = 4;
+
+/// What a goal brings about.
+pub(super) fn condition_of(family: Family, goal: Goal) -> Condition {
+    match family {
+        Family::BlockStacking => Condition::OnTop { upper: goal.source, lower: goal.target },
+        Family::ObjectSorting => Condition::Inside { category: goal.source, container: goal.target },
+    }
+}
+
+/// See [`TaskSet::validate`].
+pub(super) fn check(set: &TaskSet) -> Result<(), TaskSetError> {
+    check_ids(&set.tasks)?;
+    for (task_idx, task) in set.tasks.iter().enumerate() {
+        if task.family != set.family {
+            return Err(TaskSetError::OtherFamily { task: task_idx, found: task.family, expected: set.family });
+        }
+        check_task(task_idx, task)?;
+    }
+    check_split(&set.tasks)
+}
+
+fn check_ids(tasks: &[Task]) -> Result<(), TaskSetError> {
+    let mut places = BTreeMap::new();
+    for (second, task) in tasks.iter().enumerate() {
+        if let Some(first) = places.insert(&task.id, second) {
+            return Err(TaskSetError::DuplicateId { id: task.id.clone(), first, second });
+        }
+    }
+    Ok(())
+}
+
+fn check_task(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
+    for (what, is_empty) in [("goals", task.goals.is_empty()), ("conditions", task.conditions.is_empty())] {
+        if is_empty {
+            return Err(TaskSetError::Empty { task: task_idx, what });
+        }
+    }
+    check_slots(task_idx, task)?;
+    check_moves(task_idx, task)?;
+    if task.family == Family::BlockStacking {
+        check_towers(task_idx, task)?;
+    }
+    let brought: Vec<Condition> = task.goals.iter().map(|&goal| condition_of(task.family, goal)).collect();
+    match task.conditions.iter().position(|condition| !brought.contains(condition)) {
+        Some(at) => Err(TaskSetError::ConditionWithoutGoal { place: format!("tasks[{task_idx}].conditions[{at}]") }),
+        None => Ok(()),
+    }
+}
+
+fn goal_place(task_idx: usize, goal_idx: usize) -> String {
+    format!("tasks[{task_idx}].goals[{goal_idx}]")
+}
+
+fn check_slots(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
+    for (goal_idx, goal) in task.goals.iter().enumerate() {
+        let place = goal_place(task_idx, goal_idx);
+        check_slot(task.family, &format!("{place}.source"), goal.source, "category")?;
+        check_slot(task.family, &format!("{place}.target"), goal.target, "container")?;
+        if goal.source == goal.target {
+            return Err(TaskSetError::OwnTarget { place, slot: slot_name(task.family, goal.source) });
+        }
+    }
+    Ok(())
+}
+
+fn check_slot(family: Family, place: &str, slot: SlotIndex, expected: &'static str) -> Result<(), TaskSetError> {
+    let place = place.to_owned();
+    if usize::from(slot.0) >= family.n_slots() {
+        return Err(TaskSetError::SlotOutOfRange { place, slot, n_slots: family.n_slots() });
+    }
+    let kind = if slot.0 < N_CATEGORIES { "category" } else { "container" };
+    if family == Family::ObjectSorting && kind != expected {
+        return Err(TaskSetError::WrongKind { place, slot: slot_name(family, slot), expected });
+    }
+    Ok(())
+}
+
+fn check_moves(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
+    for (goal_idx, goal) in task.goals.iter().enumerate() {
+        if let Some(first) = task.goals[..goal_idx].iter().position(|earlier| earlier.source == goal.source) {
+            let slot = slot_name(task.family, goal.source);
+            return Err(TaskSetError::MovedTwice { place: goal_place(task_idx, goal_idx), slot, first });
+        }
+    }
+    Ok(())
+}
+
+fn check_towers(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
+    let name = |slot: SlotIndex| slot_name(task.family, slot);
+    for (goal_idx, goal) in task.goals.iter().enumerate() {
+        let place = || goal_place(task_idx, goal_idx);
+        if let Some(first) = task.goals[..goal_idx].iter().position(|earlier| earlier.target == goal.target) {
+            return Err(TaskSetError::TargetTaken { place: place(), slot: name(goal.target), first });
+        }
+    }
+    if let Some(ring) = ring(&task.goals) {
+        return Err(TaskSetError::Cycle { task: task_idx, slots: ring.into_iter().map(name).collect() });
+    }
+    for (goal_idx, goal) in task.goals.iter().enumerate() {
+        if let Some(offset) = task.goals[goal_idx..].iter().position(|later| later.source == goal.target) {
+            let place = goal_place(task_idx, goal_idx);
+            return Err(TaskSetError::TargetMovedLater { place, slot: name(goal.target), later: goal_idx + offset });
+        }
+    }
+    Ok(())
+}
+
+/// The first ring of blocks that stand on each other. Each block stands on one at most, so walking down ends on the
+/// table or in a ring.
+fn ring(goals: &[Goal]) -> Option<Vec<SlotIndex>> {
+    let below = |slot: SlotIndex| goals.iter().find(|goal| goal.source == slot).map(|goal| goal.target);
+    goals.iter().find_map(|goal| {
+        let walk: Vec<SlotIndex> =
+            std::iter::successors(Some(goal.source), |&slot| below(slot)).take(goals.len() + 1).collect();
+        let length = walk.iter().skip(1).position(|&slot| slot == goal.source)? + 1;
+        Some(walk[..length].to_vec())
+    })
+}
+
+fn check_split(tasks: &[Task]) -> Result<(), TaskSetError> {
+    let mut seen: BTreeMap<Vec<Condition>, usize> = BTreeMap::new();
+    let mut met_unseen = false;
+    for (task_idx, task) in tasks.iter().enumerate() {
+        match task.split {
+            Split::Seen if met_unseen => return Err(TaskSetError::SeenAfterUnseen { task: task_idx }),
+            Split::Seen => {
+                seen.entry(task.canonical_goal()).or_insert(task_idx);
+            }
+            Split::Unseen => {
+                met_unseen = true;
+                if let Some(&twin) = seen.get(&task.canonical_goal()) {
+                    let (unseen_id, seen_id) = (task.id.clone(), tasks[twin].id.clone());
+                    return Err(TaskSetError::SplitLeak { unseen: task_idx, unseen_id, seen: twin, seen_id });
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! Block Stacking: towers of two to four out of eight blocks.
+//!
+//! # Source
+//!
+//! The 2000 tasks that the authors released. What is known of them is counts: of tasks by goals, of tasks by towers, of
+//! towers by height. [`SHAPES`] is the table with just these counts that is nearest (in relative entropy) to drawing
+//! every order of heights equally often.
+//!
+//! # Invariants
+//!
+//! There is one stream of tasks a seed, all with different end configurations. Training takes the even places of the
+//! stream, the unseen split the odd ones: neither depends on how many the other takes, and no leak is possible. A
+//! task's id is its place in the stream.
+
+use std::collections::BTreeSet;
+
+use rand::seq::SliceRandom as _;
+
+use crate::scene::SlotIndex;
+use crate::seed::Seed;
+use crate::task::sampler::task;
+use crate::task::{Family, Goal, Split, Task};
+
+const N_BLOCKS: u16 = 8;
+
+/// The heights of a task's towers, and how many of 2000 tasks have them.
+const SHAPES: [(&[usize], u32); 14] = [
+    (&[2], 4),
+    (&[3], 11),
+    (&[4], 32),
+    (&[2, 2], 32),
+    (&[2, 3], 167),
+    (&[2, 4], 309),
+    (&[3, 3], 146),
+    (&[3, 4], 373),
+    (&[4, 4], 121),
+    (&[2, 2, 2], 40),
+    (&[2, 2, 3], 214),
+    (&[2, 2, 4], 273),
+    (&[2, 3, 3], 258),
+    (&[2, 2, 2, 2], 20),
+];
+
+/// How many different end configurations there are with towers of these heights.
+fn n_configurations(heights: &[usize]) -> u32 {
+    let n_blocks = heights.iter().sum::<usize>() as u32;
+    let placings: u32 = (0..n_blocks).map(|placed| u32::from(N_BLOCKS) - placed).product();
+    let interchangeable = |height: usize| heights.iter().filter(|&&other| other == height).count() as u32;
+    let orders: u32 = (2..=4).map(|height| (1..=interchangeable(height)).product::<u32>()).product();
+    placings / orders
+}
+
+/// How many tasks one split can have: the splits share the configurations place by place.
+pub(super) fn split_limit() -> u32 {
+    SHAPES.iter().map(|(heights, _)| n_configurations(heights)).sum::<u32>() / 2
+}
+
+/// Training tasks, then unseen ones.
+pub(super) fn sample(train: usize, unseen: usize, seed: Seed) -> Vec<Task> {
+    let length = (2 * train).max(2 * unseen);
+    let stream = stream(length, seed);
+    let place = |id: usize, split| task(format!("stack_{id:04}"), Family::BlockStacking, stream[id].clone(), split);
+    let seen = (0..train).map(|at| place(2 * at, Split::Seen));
+    seen.chain((0..unseen).map(|at| place(2 * at + 1, Split::Unseen))).collect()
+}
+
+/// The goals of the stream's first tasks. Shapes come from shuffled decks of 2000, so that the counts are exact after
+/// each deck; a shape whose configurations are used up is passed over.
+fn stream(length: usize, seed: Seed) -> Vec<Vec<Goal>> {
+    let mut drawn: BTreeSet<Vec<Goal>> = BTreeSet::new();
+    let mut n_drawn = [0_u32; SHAPES.len()];
+    let mut tasks = Vec::with_capacity(length);
+    let mut deck_idx = 0;
+    while tasks.len() < length {
+        for (card_idx, shape) in deck(seed, deck_idx).into_iter().enumerate() {
+            if tasks.len() == length {
+                break;
+            }
+            let heights = SHAPES[shape].0;
+            if n_drawn[shape] < n_configurations(heights) {
+                n_drawn[shape] += 1;
+                let mut rng = seed.derive("stacking_blocks", &[deck_idx, card_idx as u64]).rng();
+                tasks.push(new_goals(heights, &mut drawn, &mut rng));
+            }
+        }
+        deck_idx += 1;
+    }
+    tasks
+}
+
+fn deck(seed: Seed, deck_idx: u64) -> Vec<usize> {
+    let cards = |(shape, &(_, count)): (usize, &(&[usize], u32))| std::iter::repeat_n(shape, count as usize);
+    let mut deck: Vec<usize> = SHAPES.iter().enumerate().flat_map(cards).collect();
+    deck.shuffle(&mut seed.derive("stacking_shapes", &[deck_idx]).rng());
+    deck
+}
+
+/// Draws blocks and tower order until the end configuration is new.
+fn new_goals(heights: &[usize], drawn: &mut BTreeSet<Vec<Goal>>, rng: &mut impl rand::Rng) -> Vec<Goal> {
+    loop {
+        let goals = random_goals(heights, rng);
+        let mut configuration = goals.clone();
+        configuration.sort_unstable();
+        if drawn.insert(configuration) {
+            return goals;
+        }
+    }
+}
+
+/// Bottom-up, one tower finished before the next, towers in any order.
+fn random_goals(heights: &[usize], rng: &mut impl rand::Rng) -> Vec<Goal> {
+    let mut heights = heights.to_vec();
+    heights.shuffle(rng);
+    let mut blocks: Vec<SlotIndex> = (0..N_BLOCKS).map(SlotIndex).collect();
+    blocks.shuffle(rng);
+    let mut rest = blocks.as_slice();
+    let mut goals = Vec::new();
+    for height in heights {
+        let (tower, others) = rest.split_at(height);
+        goals.extend(tower.windows(2).map(|pair| Goal { source: pair[1], target: pair[0] }));
+        rest = others;
+    }
+    goals
+}
