@@ -1,5 +1,7 @@
 //! Reports: from rollouts and metrics tables to results, tables and the page.
 
+#![cfg(test)]
+
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +78,7 @@ fn ten_rollouts() -> Vec<Rollout> {
 fn metrics_table(n_steps: i64) -> DataFrame {
     let steps: Vec<i64> = (0..n_steps).flat_map(|step| [step, step]).collect();
     let n = steps.len();
-    let level = |row: usize| if row % 2 == 0 { "pick" } else { "block_stacking" };
+    let level = |row: usize| if row.is_multiple_of(2) { "pick" } else { "block_stacking" };
     let loss: Vec<Option<f32>> = steps.iter().map(|&step| Some(0.5_f32.powf(step as f32 / 100.0))).collect();
     let mut scope = loss.clone();
     scope.first_mut().into_iter().for_each(|loss| *loss = Some(f32::NAN));
