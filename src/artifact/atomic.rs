@@ -1,7 +1,7 @@
 //! Atomic writing, reading with the path in the error, hashing.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
+use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -102,6 +102,14 @@ impl Write for AtomicFile {
 
     fn flush(&mut self) -> std::io::Result<()> {
         self.writer.flush()
+    }
+}
+
+/// Reads back what has been written.
+impl Read for AtomicFile {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.writer.flush()?;
+        self.writer.get_mut().read(buffer)
     }
 }
 

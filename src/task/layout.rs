@@ -33,7 +33,7 @@ const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
 
 /// The most instances of one category.
-pub(crate) const MAX_INSTANCES: u16 = 10;
+pub const MAX_INSTANCES: u16 = 10;
 
 const BLOCK_LETTERS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
 const BLOCK_COLORS: [[u8; 3]; 8] = [

@@ -1,9 +1,15 @@
 //! Learning curves.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use crate::program::Program;
+use crate::table::{self, Column, TableError, TableSchema};
 use crate::training::learner::Losses;
+
+/// Name of the learning curves in a model's folder (schemas/parquet/metrics.message).
+pub const METRICS_FILE: &str = "metrics.parquet";
 
 /// One row of `metrics.parquet`: the losses of one level in one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,4 +49,25 @@ impl Metric {
             examples,
         }
     }
+}
+
+/// Writes learning curves.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub fn write_metrics(path: &Path, metrics: &[Metric]) -> Result<(), TableError> {
+    let loss = |of: fn(&Metric) -> Option<f32>| Column::OptionalFloat32(metrics.iter().map(of).collect());
+    let columns = vec![
+        ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
+        ("level", Column::Text(metrics.iter().map(|metric| metric.level.name().to_owned()).collect())),
+        ("loss_program", loss(|metric| Some(metric.loss_program))),
+        ("loss_end", loss(|metric| Some(metric.loss_end))),
+        ("loss_scope", loss(|metric| metric.loss_scope)),
+        ("loss_argument", loss(|metric| metric.loss_argument)),
+        ("loss_total", loss(|metric| Some(metric.loss_total))),
+        ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
+        ("examples", Column::Int64(metrics.iter().map(|metric| i64::from(metric.examples)).collect())),
+    ];
+    table::write(path, &TableSchema::METRICS, columns)
 }
