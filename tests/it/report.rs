@@ -1,5 +1,7 @@
 //! Reports: from rollouts and metrics tables to results, tables and the page.
 
+#![cfg(test)]
+
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +78,7 @@ fn ten_rollouts() -> Vec<Rollout> {
 fn metrics_table(n_steps: i64) -> DataFrame {
     let steps: Vec<i64> = (0..n_steps).flat_map(|step| [step, step]).collect();
     let n = steps.len();
-    let level = |row: usize| if row % 2 == 0 { "pick" } else { "block_stacking" };
+    let level = |row: usize| if row.is_multiple_of(2) { "pick" } else { "block_stacking" };
     let loss: Vec<Option<f32>> = steps.iter().map(|&step| Some(0.5_f32.powf(step as f32 / 100.0))).collect();
     let mut scope = loss.clone();
     scope.first_mut().into_iter().for_each(|loss| *loss = Some(f32::NAN));
@@ -274,6 +276,45 @@ fn rows_in_any_order_give_the_same_results() {
     let rows = ten_rollouts();
     let reversed: Vec<Rollout> = rows.iter().rev().cloned().collect();
     assert_eq!(Run::new(&rows).make().results, Run::new(&reversed).make().results);
+}
+
+/// The ten rollouts by the writer that the rollout stage uses.
+fn write_own_table(path: &Path) {
+    use ntp::table::{Column, TableSchema, write};
+    let rows = ten_rollouts();
+    let text = |of: fn(&Rollout) -> &str| Column::Text(rows.iter().map(|row| of(row).to_owned()).collect());
+    let whole = |of: fn(&Rollout) -> i64| Column::Int64(rows.iter().map(of).collect());
+    let maybe = |of: fn(&Rollout) -> Option<&'static str>| {
+        Column::OptionalText(rows.iter().map(|row| of(row).map(str::to_owned)).collect())
+    };
+    let columns = vec![
+        ("variant", text(|row| row.variant)),
+        ("suite", text(|row| row.suite)),
+        ("training_seed", whole(|row| row.seed)),
+        ("episode", whole(|row| row.episode)),
+        ("task_id", text(|_| "stack_0000")),
+        ("split", text(|_| "unseen")),
+        ("outcome", text(|row| row.cause.unwrap_or("success"))),
+        ("success", Column::Boolean(rows.iter().map(|row| row.cause.is_none()).collect())),
+        ("cause", maybe(|row| row.cause)),
+        ("calls", whole(|row| 30 + row.episode % 7)),
+        ("decisions", whole(|row| 40 + row.episode % 7)),
+        ("first_divergence", Column::OptionalInt64(rows.iter().map(|row| row.divergence.map(|(at, ..)| at)).collect())),
+        ("divergence_kind", maybe(|row| row.divergence.map(|(_, kind, _)| kind))),
+        ("divergence_program", maybe(|row| row.divergence.map(|(.., program)| program))),
+        ("sim_secs", Column::Float64(rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect())),
+    ];
+    write(path, &TableSchema::ROLLOUTS, columns).unwrap();
+}
+
+#[test]
+fn tables_of_our_own_writer_give_the_same_report() {
+    let run = Run::new(&ten_rollouts());
+    let before = run.make();
+    write_own_table(rollouts_path(&run));
+    let after = run.make();
+    assert_eq!(before.results, after.results);
+    assert_eq!(before.divergences, after.divergences);
 }
 
 #[test]
