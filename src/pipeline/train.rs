@@ -11,7 +11,7 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{ModelSpec, PipelineError, Stage, tasks};
 use crate::task::Split;
-use crate::training::{self, Hooks, METRICS_FILE, TrainConfig, write_metrics};
+use crate::training::{self, Hooks, METRICS_FILE, TrainConfig};
 
 /// What a finished training leaves; checkpoints are not part of it.
 const RESULT_FILES: [&str; 3] = [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE];
@@ -58,7 +58,6 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let summary = training::train(&config, &trials, unit.dir.path(), &mut hooks);
     context.go_on()?;
     let summary = summary?;
-    write_metrics(&unit.dir.path().join(METRICS_FILE), &summary.metrics)?;
     let files: Result<Vec<FileEntry>, IoError> =
         RESULT_FILES.iter().map(|file| FileEntry::of(unit.dir.path(), file)).collect();
     unit.dir.commit_shard(&Receipt {

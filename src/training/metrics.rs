@@ -1,4 +1,4 @@
-//! Learning curves.
+//! Learning curves, and their table `metrics.parquet` (schemas/parquet/metrics.message).
 
 use std::path::Path;
 
@@ -7,9 +7,6 @@ use serde::{Deserialize, Serialize};
 use crate::program::Program;
 use crate::table::{self, Column, TableError, TableSchema};
 use crate::training::learner::Losses;
-
-/// Name of the learning curves in a model's folder (schemas/parquet/metrics.message).
-pub const METRICS_FILE: &str = "metrics.parquet";
 
 /// One row of `metrics.parquet`: the losses of one level in one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,16 +53,16 @@ impl Metric {
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn write_metrics(path: &Path, metrics: &[Metric]) -> Result<(), TableError> {
-    let loss = |of: fn(&Metric) -> Option<f32>| Column::OptionalFloat32(metrics.iter().map(of).collect());
+pub(crate) fn write(path: &Path, metrics: &[Metric]) -> Result<(), TableError> {
+    let losses = |loss: fn(&Metric) -> Option<f32>| Column::OptionalFloat32(metrics.iter().map(loss).collect());
     let columns = vec![
         ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
         ("level", Column::Text(metrics.iter().map(|metric| metric.level.name().to_owned()).collect())),
-        ("loss_program", loss(|metric| Some(metric.loss_program))),
-        ("loss_end", loss(|metric| Some(metric.loss_end))),
-        ("loss_scope", loss(|metric| metric.loss_scope)),
-        ("loss_argument", loss(|metric| metric.loss_argument)),
-        ("loss_total", loss(|metric| Some(metric.loss_total))),
+        ("loss_program", losses(|metric| Some(metric.loss_program))),
+        ("loss_end", losses(|metric| Some(metric.loss_end))),
+        ("loss_scope", losses(|metric| metric.loss_scope)),
+        ("loss_argument", losses(|metric| metric.loss_argument)),
+        ("loss_total", losses(|metric| Some(metric.loss_total))),
         ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
         ("examples", Column::Int64(metrics.iter().map(|metric| i64::from(metric.examples)).collect())),
     ];
