@@ -228,3 +228,14 @@ fn a_pipeline_that_is_not_there_is_a_usage_error_with_its_path() {
     assert!(error.to_string().contains("no/such.toml"));
     assert_eq!(run(&["run", "no/such.toml"]).0, 2);
 }
+
+#[test]
+fn the_committed_pipeline_schema_is_the_generated_one() {
+    let path = repository().join("schemas/pipeline.schema.json");
+    let schema = schemars::schema_for!(ntp::pipeline::PipelineSpec);
+    let generated = format!("{}\n", serde_json::to_string_pretty(&schema).unwrap());
+    if std::fs::read_to_string(&path).ok().as_ref() != Some(&generated) {
+        std::fs::write(&path, &generated).unwrap();
+        panic!("{} was stale and has been written anew: look at the change and commit it", path.display());
+    }
+}
