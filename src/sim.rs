@@ -25,6 +25,7 @@ mod error;
 mod grasp;
 mod gripper;
 mod motion;
+mod sweep;
 mod watch;
 mod world;
 

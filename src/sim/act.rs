@@ -7,7 +7,7 @@ use crate::scene::{BodyIndex, Mobility, Shape, SlotIndex};
 use crate::sim::Simulation;
 use crate::sim::gripper::{Gripper, MAX_OPENING_M, TIP_M};
 use crate::sim::motion::{Motion, Tool};
-use crate::sim::world::AtStart;
+use crate::sim::sweep::AtStart;
 use crate::sim::{drop_spot, grasp};
 use crate::trace::Cause;
 

@@ -15,7 +15,8 @@ use rapier3d::math::{Pose as EnginePose, Vector};
 
 use crate::scene::BodyIndex;
 use crate::sim::motion::Tool;
-use crate::sim::world::{AtStart, GRIPPER_GROUP, SCENE_GROUP, World, groups};
+use crate::sim::sweep::AtStart;
+use crate::sim::world::{GRIPPER_GROUP, SCENE_GROUP, World, groups};
 
 /// The widest opening, in metres.
 pub(super) const MAX_OPENING_M: f32 = 0.07;
@@ -190,7 +191,7 @@ impl Gripper {
         let parts = hull(tool).into_iter().chain(self.carried(world, tool));
         parts
             .filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held))
-            .fold(path.length(), |least, hit| least.min(hit.distance_m))
+            .fold(path.length(), f32::min)
     }
 }
 

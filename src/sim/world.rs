@@ -13,7 +13,7 @@
 use rapier3d::dynamics::{RigidBody, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients};
 use rapier3d::geometry::{ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, Ray};
 use rapier3d::math::{Pose as EnginePose, Vector};
-use rapier3d::parry::query::ShapeCastOptions;
+use rapier3d::parry::bounding_volume::BoundingVolume as _;
 use rapier3d::parry::shape::Shape as EngineShape;
 use rapier3d::pipeline::{PhysicsWorld, QueryFilter, QueryPipeline};
 
@@ -21,6 +21,7 @@ use crate::geometry::Pose;
 use crate::scene::{BodyIndex, Mobility, Scene, SceneState, Shape};
 use crate::sim::SimulationConfig;
 use crate::sim::engine_shape::{Part, from_engine, parts, to_engine};
+use crate::sim::sweep::{self, AtStart};
 
 /// Natural frequency of contacts, in Hz.
 const CONTACT_HZ: f32 = 120.0;
@@ -58,15 +59,6 @@ pub(super) struct Hit {
     pub(super) body: Option<BodyIndex>,
     /// How far away, in metres.
     pub(super) distance_m: f32,
-}
-
-/// Whether a cast that starts in touch with something is over at once.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum AtStart {
-    /// It is.
-    Stops,
-    /// Only if it goes on into it.
-    MayLeave,
 }
 
 /// Table, ground and bodies in the engine.
@@ -137,7 +129,7 @@ impl World {
         Some(Hit { body: self.owner(collider), distance_m })
     }
 
-    /// The first thing that a shape meets on the way along `path`.
+    /// How far a shape can move along `path` before it meets something; `None` when it meets nothing.
     pub(super) fn cast(
         &self,
         shape: &dyn EngineShape,
@@ -145,19 +137,14 @@ impl World {
         path: Vector,
         at_start: AtStart,
         except: Option<RigidBodyHandle>,
-    ) -> Option<Hit> {
-        let length = path.length();
-        if length <= 0.0 {
-            return None;
-        }
-        let options = ShapeCastOptions {
-            max_time_of_impact: length,
-            stop_at_penetration: at_start == AtStart::Stops,
-            compute_impact_geometry_on_penetration: false,
-            ..ShapeCastOptions::default()
-        };
-        let (collider, hit) = self.queries(except).cast_shape(from, path / length, shape, options)?;
-        Some(Hit { body: self.owner(collider), distance_m: hit.time_of_impact })
+    ) -> Option<f32> {
+        let start = shape.compute_aabb(from);
+        let swept = start.merged(&start.translated(path));
+        let queries = self.queries(except);
+        let near = queries.intersect_aabb_conservative(swept).map(|(_, collider)| collider);
+        near.filter(|collider| collider.compute_aabb().intersects(&swept))
+            .filter_map(|collider| sweep::free_way_m(shape, from, path, collider, at_start))
+            .min_by(f32::total_cmp)
     }
 
     fn queries(&self, except: Option<RigidBodyHandle>) -> QueryPipeline<'_> {

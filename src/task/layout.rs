@@ -20,6 +20,8 @@ const BLOCK_PITCH_M: f32 = 0.1;
 const BLOCK_JITTER_M: f32 = 0.03;
 /// Least distance between two blocks' centres at the start: fingers must fit between neighbours.
 const BLOCK_SPACING_M: f32 = 0.08;
+/// Draws of one block's position before all are drawn anew.
+const MAX_DRAWS: usize = 200;
 
 /// Cells that sorting objects start on, and their pitch.
 const SORTING_CELLS: [usize; 2] = [9, 7];
@@ -154,19 +156,29 @@ pub fn initial_state(family: Family, scene: &Scene, seed: Seed) -> SceneState {
 fn stacking_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {
     let mut cells: Vec<(usize, usize)> = (0..16).map(|cell| (cell % 4, cell / 4)).collect();
     cells.shuffle(rng);
-    let middle = |cell: usize| (cell as f32 - 1.5) * BLOCK_PITCH_M;
-    let mut positions: Vec<Vec3> = Vec::new();
-    for &(column, row) in cells.iter().take(scene.bodies.len()) {
-        loop {
-            let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
-            let position = Vec3::new(middle(column) + jitter(), middle(row) + jitter(), BLOCK_M / 2.0);
-            if positions.iter().all(|other| horizontal_distance(other, &position) >= BLOCK_SPACING_M) {
-                positions.push(position);
-                break;
-            }
+    loop {
+        if let Some(positions) = try_stacking_positions(&cells[..scene.bodies.len()], rng) {
+            return positions;
         }
     }
-    positions
+}
+
+/// One try: a block may find no place between blocks that came to lie near its cell.
+fn try_stacking_positions(cells: &[(usize, usize)], rng: &mut impl rand::Rng) -> Option<Vec<Vec3>> {
+    let middle = |cell: usize| (cell as f32 - 1.5) * BLOCK_PITCH_M;
+    let mut positions: Vec<Vec3> = Vec::new();
+    for &(column, row) in cells {
+        let mut draw = || {
+            let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
+            Vec3::new(middle(column) + jitter(), middle(row) + jitter(), BLOCK_M / 2.0)
+        };
+        let is_free = |position: &Vec3| {
+            positions.iter().all(|other| horizontal_distance(other, position) >= BLOCK_SPACING_M)
+        };
+        let position = (0..MAX_DRAWS).map(|_| draw()).find(is_free)?;
+        positions.push(position);
+    }
+    Some(positions)
 }
 
 fn sorting_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {

@@ -78,6 +78,12 @@ fn probe_sorting() {
         let episode = demonstrate(&task, &mut world, Provenance::new(&task, &trial, Actor::Expert, index)).unwrap();
         if episode.outcome != Outcome::Success {
             failures.push((index, episode.outcome, episode.frames.iter().filter(|f| f.boundary).count()));
+            let n = episode.frames.len();
+            for f in &episode.frames[n-8..] {
+                eprintln!("{} {} {:?} {} {:?} {:?}", f.time_nanos, f.boundary, f.state.gripper_in_world, f.state.opening_m, f.state.held, f.slots);
+                for s in &f.slots[..4] { eprint!("   {:?}", f.state.body_in_world(*s).translation.vector); }
+                eprintln!();
+            }
         }
     }
     let cpu = start.elapsed().as_secs_f64();
