@@ -63,7 +63,9 @@ pub enum TrainError {
         total: usize,
     },
     /// Trials of different families cannot be learned together.
-    #[error("the dataset holds more than one family: trial {trial} of task {task} is of {found}, the first of {expected}")]
+    #[error(
+        "the dataset holds more than one family: trial {trial} of task {task} is of {found}, the first of {expected}"
+    )]
     MixedFamilies {
         /// The first trial that differs.
         trial: u32,
@@ -153,8 +155,8 @@ pub fn train(
     let config = config.resolved();
     let examples = Examples::new(data)?;
     let family = family(data)?;
-    let training = serde_json::to_value(&config)
-        .map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
+    let training =
+        serde_json::to_value(&config).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
     let model = ModelConfig::new(config.variant, family, data.n_slots, training);
     let device = Device::flex().autodiff();
     let seed = Seed(config.seed).derive("train", &[]);

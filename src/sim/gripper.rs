@@ -189,9 +189,7 @@ impl Gripper {
     pub(super) fn free_way_m(&self, world: &World, tool: &Tool, path: Vector, at_start: AtStart) -> f32 {
         let held = self.held_handle();
         let parts = hull(tool).into_iter().chain(self.carried(world, tool));
-        parts
-            .filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held))
-            .fold(path.length(), f32::min)
+        parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
     }
 }
 

@@ -172,9 +172,8 @@ fn try_stacking_positions(cells: &[(usize, usize)], rng: &mut impl rand::Rng) ->
             let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
             Vec3::new(middle(column) + jitter(), middle(row) + jitter(), BLOCK_M / 2.0)
         };
-        let is_free = |position: &Vec3| {
-            positions.iter().all(|other| horizontal_distance(other, position) >= BLOCK_SPACING_M)
-        };
+        let is_free =
+            |position: &Vec3| positions.iter().all(|other| horizontal_distance(other, position) >= BLOCK_SPACING_M);
         let position = (0..MAX_DRAWS).map(|_| draw()).find(is_free)?;
         positions.push(position);
     }

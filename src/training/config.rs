@@ -159,7 +159,8 @@ impl TrainConfig {
             ("loss.scope", loss.scope),
             ("loss.argument", loss.argument),
         ];
-        let refuse = |key: &'static str, found: String, allowed: &'static str| TrainError::Config { key, found, allowed };
+        let refuse =
+            |key: &'static str, found: String, allowed: &'static str| TrainError::Config { key, found, allowed };
         let counts = at_least_one.into_iter().filter(|(_, value)| *value == 0);
         let mut wrong = counts.map(|(key, value)| refuse(key, value.to_string(), "at least 1"));
         if let Some(error) = wrong.next() {
