@@ -35,5 +35,6 @@ pub use memory::ProgramMemory;
 pub use network::{Network, Windows};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
 pub use store::{
-    CONFIG_FILE, ModelError, WEIGHTS_FILE, check_purpose, load, load_config, weights_from_bytes, weights_to_bytes,
+    CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
+    weights_to_bytes,
 };

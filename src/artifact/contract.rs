@@ -134,14 +134,6 @@ pub enum ContractError {
         /// Out of how many.
         total: u32,
     },
-    /// The folder holds results of other settings.
-    #[error("{stage} in {} was made by other settings; choose another --out or give --force", path.display())]
-    ForeignPlan {
-        /// The stage.
-        stage: String,
-        /// Its folder.
-        path: PathBuf,
-    },
     /// A file that the manifest names is not as the manifest says.
     #[error("{}: {problem}", path.display())]
     FileDiffers {
@@ -238,9 +230,18 @@ impl StageDir {
     pub fn begin(&self, plan: &Plan) -> Result<(), IoError> {
         if self.plan()?.as_ref() != Some(plan) {
             self.clear()?;
-            write_json(&self.plan_path(), plan)?;
+            self.write_plan(plan)?;
         }
         Ok(())
+    }
+
+    /// Writes the plan beside what is there already: for a folder that is made elsewhere and moved here when whole.
+    ///
+    /// # Errors
+    ///
+    /// When the folder cannot be written.
+    pub fn write_plan(&self, plan: &Plan) -> Result<(), IoError> {
+        write_json(&self.plan_path(), plan)
     }
 
     /// Removes everything the stage made.

@@ -171,11 +171,7 @@ impl Network for ObjectCentric {
 
     fn window(demonstration: &ObjectDemonstration, span: Span) -> ObjectDemonstration {
         let cut = |frames: &Tensor<4>| frames.clone().narrow(1, span.begin as usize, span.len());
-        ObjectDemonstration {
-            pairs: cut(&demonstration.pairs),
-            objects: cut(&demonstration.objects),
-            padding: None,
-        }
+        ObjectDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
     }
 
     fn read(&self, demonstration: &ObjectDemonstration, states: &[f32]) -> ObjectReading {

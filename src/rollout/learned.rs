@@ -97,10 +97,10 @@ impl<N: Network> LearnedPolicy<N> {
         } else {
             Vec::new()
         };
-        let scope = self.decoder.decode(&labels).map(|within| Span {
-            begin: query.window.begin + within.begin,
-            end: query.window.begin + within.end,
-        });
+        let scope = self
+            .decoder
+            .decode(&labels)
+            .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
         let argument = program.takes_argument().then(|| {
             let slots = values(self.network.argument(&reading, query.program, &core));
             SlotIndex(likeliest(&slots).0 as u16)

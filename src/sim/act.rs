@@ -82,7 +82,8 @@ impl Simulation {
             self.close_on_air();
             return self.miss();
         };
-        let yaw_rad = grasp::yaw_rad(&self.scene.body(body).shape, &self.world.in_world(body), self.gripper.tool.yaw_rad);
+        let yaw_rad =
+            grasp::yaw_rad(&self.scene.body(body).shape, &self.world.in_world(body), self.gripper.tool.yaw_rad);
         self.follow(Tool { yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
         self.sink(self.world.in_world(body).translation.z + GRASP_M, 0.0);
         if !self.close_on(body) || !grasp::is_between_fingers(&self.gripper.tool, &self.world.in_world(body)) {
@@ -116,7 +117,8 @@ impl Simulation {
         let Some(body) = self.gripper.let_go(&mut self.world) else {
             return Err(Cause::DroppedObject);
         };
-        let opening = Motion::new(self.gripper.tool, Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, &self.config);
+        let opening =
+            Motion::new(self.gripper.tool, Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, &self.config);
         for step in 1..=opening.n_steps {
             self.tick(opening.at(step), Air::Unknown);
         }

@@ -122,9 +122,8 @@ fn depth_below_table_m(solid: &Solid<'_>) -> f32 {
 
 fn overlap_m(first: &Solid<'_>, second: &Solid<'_>) -> f32 {
     let pairs = first.parts.iter().flat_map(|a| second.parts.iter().map(move |b| (a, b)));
-    let near = pairs.filter(|((a, pose_a), (b, pose_b))| {
-        a.shape.compute_aabb(pose_a).intersects(&b.shape.compute_aabb(pose_b))
-    });
+    let near = pairs
+        .filter(|((a, pose_a), (b, pose_b))| a.shape.compute_aabb(pose_a).intersects(&b.shape.compute_aabb(pose_b)));
     near.filter_map(|((a, pose_a), (b, pose_b))| contact(pose_a, &*a.shape, pose_b, &*b.shape, 0.0).ok().flatten())
         .fold(0.0, |deepest: f32, contact| deepest.max(-contact.dist))
 }

@@ -22,13 +22,7 @@ pub struct SimulationConfig {
 
 impl Default for SimulationConfig {
     fn default() -> Self {
-        Self {
-            step_hz: 240,
-            frame_hz: 10,
-            speed_m_per_s: 1.25,
-            acceleration_m_per_s2: 15.0,
-            settle_limit_secs: 3.0,
-        }
+        Self { step_hz: 240, frame_hz: 10, speed_m_per_s: 1.25, acceleration_m_per_s2: 15.0, settle_limit_secs: 3.0 }
     }
 }
 
@@ -40,7 +34,8 @@ impl SimulationConfig {
     /// [`SimError::Config`] for the first setting that is not allowed.
     pub fn check(&self) -> Result<(), SimError> {
         let Self { step_hz, frame_hz, speed_m_per_s, acceleration_m_per_s2, settle_limit_secs } = self;
-        let wrong = |key, found: String, allowed: &str| Err(SimError::Config { key, found, allowed: allowed.to_owned() });
+        let wrong =
+            |key, found: String, allowed: &str| Err(SimError::Config { key, found, allowed: allowed.to_owned() });
         let positive = |value: f32, most: f32| value > 0.0 && value <= most;
         if !(120..=2000).contains(step_hz) {
             return wrong("step_hz", step_hz.to_string(), "120 to 2000");

@@ -13,17 +13,8 @@ const WALL_MARGIN_M: f32 = 0.006;
 /// A spot must be this much lower than one nearer to the middle, in metres.
 const LOWER_M: f32 = 0.003;
 /// The spots, as parts of the free half widths, nearest to the middle first.
-const SPOTS: [[f32; 2]; 9] = [
-    [0.0, 0.0],
-    [1.0, 0.0],
-    [-1.0, 0.0],
-    [0.0, 1.0],
-    [0.0, -1.0],
-    [1.0, 1.0],
-    [-1.0, -1.0],
-    [1.0, -1.0],
-    [-1.0, 1.0],
-];
+const SPOTS: [[f32; 2]; 9] =
+    [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
 
 /// The open box that the gripper is over or in, if any.
 pub(super) fn container_below(scene: &Scene, world: &World, tool: &Tool) -> Option<BodyIndex> {
@@ -39,7 +30,8 @@ pub(super) fn container_below(scene: &Scene, world: &World, tool: &Tool) -> Opti
 /// Where to hold the gripper, at its present height, before it goes down into the container.
 pub(super) fn choose(scene: &Scene, world: &World, gripper: &Gripper, container: BodyIndex) -> Vector {
     let tool = gripper.tool;
-    let (Some(held), Shape::OpenBox { inner_m: [x, y, height], .. }) = (gripper.held, scene.body(container).shape) else {
+    let (Some(held), Shape::OpenBox { inner_m: [x, y, height], .. }) = (gripper.held, scene.body(container).shape)
+    else {
         return tool.position;
     };
     let box_in_world = world.in_world(container);

@@ -173,9 +173,7 @@ impl Place {
         let offset = match *self {
             Self::Offset(offset) => offset,
             Self::Above { slot, .. } if next_move.is_some_and(|next| usize::from(next.0) == slot) => return,
-            Self::Above { slot, height_m } => {
-                [state[3 * slot], state[3 * slot + 1], state[3 * slot + 2] + height_m]
-            }
+            Self::Above { slot, height_m } => [state[3 * slot], state[3 * slot + 1], state[3 * slot + 2] + height_m],
         };
         let n_coordinates = state.len() - 2;
         for position in state[..n_coordinates].chunks_exact_mut(3) {

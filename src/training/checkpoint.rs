@@ -92,7 +92,8 @@ impl<'c> Checkpoints<'c> {
 
     /// Goes on where a checkpoint of the same training stands; nothing when there is none.
     pub(crate) fn resume<N: Network>(&self, learner: Learner<N>) -> Result<Result<Resumed<N>, Learner<N>>, TrainError> {
-        let Some(latest) = self.latest()?.filter(|latest| latest.model == *self.model && latest.dataset == self.dataset)
+        let Some(latest) =
+            self.latest()?.filter(|latest| latest.model == *self.model && latest.dataset == self.dataset)
         else {
             return Ok(Err(learner));
         };

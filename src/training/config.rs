@@ -20,7 +20,7 @@ pub struct TrainConfig {
     pub seed: u64,
     /// Decisions of the root program in a step; programs below it have half as many each.
     pub batch: u32,
-    /// Highest learning rate; by default 0.002 for object-centric and 0.001 for flattened networks.
+    /// Highest learning rate; by default 0.003 for object-centric and 0.001 for flattened networks.
     pub learning_rate: Option<f32>,
     /// Steps in which the learning rate rises from zero.
     pub warmup_steps: u32,
@@ -122,7 +122,7 @@ impl TrainConfig {
     #[must_use]
     pub fn resolved(&self) -> Self {
         let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
-            Variant::Ntp => (0.002, 0.0, 0.2),
+            Variant::Ntp => (0.003, 0.0, 0.2),
             Variant::NtpPaper => (0.001, 1.0, 0.0),
         };
         Self {
@@ -159,7 +159,8 @@ impl TrainConfig {
             ("loss.scope", loss.scope),
             ("loss.argument", loss.argument),
         ];
-        let refuse = |key: &'static str, found: String, allowed: &'static str| TrainError::Config { key, found, allowed };
+        let refuse =
+            |key: &'static str, found: String, allowed: &'static str| TrainError::Config { key, found, allowed };
         let counts = at_least_one.into_iter().filter(|(_, value)| *value == 0);
         let mut wrong = counts.map(|(key, value)| refuse(key, value.to_string(), "at least 1"));
         if let Some(error) = wrong.next() {

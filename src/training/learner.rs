@@ -98,8 +98,7 @@ impl<N: Network> Learner<N> {
     #[must_use]
     pub fn step(self, parts: &[Part], learning_rate: f64) -> (Self, Vec<Losses>) {
         let device = self.network.device();
-        let copies: Vec<(N, &Part)> =
-            parts.iter().map(|part| (self.network.clone().fork(&device), part)).collect();
+        let copies: Vec<(N, &Part)> = parts.iter().map(|part| (self.network.clone().fork(&device), part)).collect();
         let weights = self.weights;
         let results: Vec<(Losses, Vec<f32>)> =
             copies.par_iter().map(|(network, part)| gradient(network, part, weights)).collect();

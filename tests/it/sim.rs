@@ -58,7 +58,11 @@ fn probe_stacking() {
     let cpu = start.elapsed().as_secs_f64();
     eprintln!(
         "stacking: {n} demos, {} failures {failures:?}, {:.2} ms/demo, {:.2} goals, {:.1} frames, {:.2} s",
-        failures.len(), 1e3 * cpu / n as f64, n_goals as f64 / n as f64, n_frames as f64 / n as f64, secs / n as f64
+        failures.len(),
+        1e3 * cpu / n as f64,
+        n_goals as f64 / n as f64,
+        n_frames as f64 / n as f64,
+        secs / n as f64
     );
 }
 
@@ -89,7 +93,8 @@ fn probe_tower() {
     let shape = Shape::Cuboid { half_extents_m: [0.025; 3] };
     let body = |name: String| Body { name, shape, mobility: Mobility::Movable, color: [0; 3] };
     let bodies: Vec<Body> = (0..8).map(|i| body(format!("b{i}"))).collect();
-    let slots = bodies.iter().enumerate().map(|(i, b)| Slot { name: b.name.clone(), bodies: vec![BodyIndex(i as u16)] });
+    let slots =
+        bodies.iter().enumerate().map(|(i, b)| Slot { name: b.name.clone(), bodies: vec![BodyIndex(i as u16)] });
     let scene = Scene { slots: slots.collect(), bodies, table_half_m: [0.4; 2] };
     let position = |i: usize| Vec3::new(-0.28 + 0.08 * i as f32, 0.0, 0.025);
     let initial = SceneState {
@@ -100,12 +105,25 @@ fn probe_tower() {
     };
     let mut world = Simulation::new(scene, &initial, &SimulationConfig::default()).unwrap();
     for upper in 1..8 {
-        for action in [Action::MoveTo(SlotIndex(upper)), Action::Grip, Action::MoveTo(SlotIndex(upper - 1)), Action::Release] {
+        for action in
+            [Action::MoveTo(SlotIndex(upper)), Action::Grip, Action::MoveTo(SlotIndex(upper - 1)), Action::Release]
+        {
             let acted = world.act(action);
-            eprintln!("{upper} {action:?} {acted:?} {:?}", world.state().body_in_world(BodyIndex(upper)).translation.vector);
+            eprintln!(
+                "{upper} {action:?} {acted:?} {:?}",
+                world.state().body_in_world(BodyIndex(upper)).translation.vector
+            );
         }
     }
-    for f in world.frames() { eprintln!("{} {} {:?} {}", f.time_nanos as f64*1e-9, f.boundary, f.state.gripper_in_world.translation.vector, f.state.opening_m); }
+    for f in world.frames() {
+        eprintln!(
+            "{} {} {:?} {}",
+            f.time_nanos as f64 * 1e-9,
+            f.boundary,
+            f.state.gripper_in_world.translation.vector,
+            f.state.opening_m
+        );
+    }
     let state = world.settle();
     for i in 0..8 {
         let p = state.bodies_in_world[i].translation.vector;
