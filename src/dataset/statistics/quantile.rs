@@ -10,7 +10,7 @@
 
 use std::path::Path;
 
-use arrow::array::{Array, ArrayRef, AsArray as _};
+use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::datatypes::{DataType, Float32Type, Float64Type, Int64Type};
 
 use crate::dataset::feature::Dtype;
