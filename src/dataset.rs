@@ -1,5 +1,52 @@
-//! Recordings to a LeRobotDataset v3.0 with program tables beside it, and back into memory.
+//! Recordings to a `LeRobotDataset` v3.0 with program tables beside it, and back into memory.
+//!
+//! # Input and output
+//!
+//! [`convert`] reads episodes of recordings (demonstrations or rollouts) and writes a directory:
+//!
+//! ```text
+//! meta/info.json, stats.json, tasks.parquet, subtasks.parquet, episodes/chunk-000/file-000.parquet
+//! data/chunk-000/file-000.parquet            one row per frame
+//! ntp/info.json, episodes.parquet            provenance, one row per episode
+//! ntp/calls/chunk-000/file-000.parquet       one row per program call
+//! ntp/scopes/chunk-000/file-000.parquet      one row per call and frame of its caller's window
+//! ```
+//!
+//! Every table's schema is in schemas/parquet. [`read_trials`] reads what a learner needs, [`validate`] checks every
+//! cross-reference, [`summarize`] says what a dataset is.
+//!
+//! # Invariants
+//!
+//! Labels are columns `ntp.*`: a robot learner takes `observation.*` and `action` alone as its inputs and outputs.
+//! Memory does not grow with the number of episodes, but for the distinct task texts. The same episodes give the same
+//! bytes.
 
+mod call_rows;
+mod calls;
+mod config;
+mod convert;
+mod cursor;
+mod episode_rows;
+mod episode_view;
+mod episodes;
+mod error;
+mod feature;
+mod frame_map;
+mod frame_rows;
+mod frames;
+mod info;
+mod layout;
+mod read;
+mod rolling;
+pub mod schema;
+mod statistics;
+mod text;
 mod trial_data;
+mod writer;
 
+pub use config::{ConvertConfig, FailedEpisodes, FrameChoice};
+pub use convert::{RecordingEpisodes, convert};
+pub use error::{ConvertError, DatasetError};
+pub use read::read_trials;
 pub use trial_data::{DatasetTrials, TrialData};
+pub use writer::{ConvertSummary, DatasetWriter};

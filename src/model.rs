@@ -28,12 +28,13 @@ mod object_centric;
 mod store;
 
 pub use config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
-pub use decoder::{Decoder, LabelScores, maximum_subsequence};
+pub use decoder::{Decoder, LabelScores, span_score};
 pub use flattened::{FlatDemonstration, FlatReading, Flattened, FlattenedConfig};
 pub use heads::{CoreOutput, ScopeHead};
 pub use memory::ProgramMemory;
 pub use network::{Network, Windows};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
 pub use store::{
-    CONFIG_FILE, ModelError, WEIGHTS_FILE, check_purpose, load, load_config, weights_from_bytes, weights_to_bytes,
+    CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
+    weights_to_bytes,
 };

@@ -12,9 +12,11 @@ mod interpreter;
 mod learned;
 mod oracle;
 mod policy;
+mod rows;
 
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use interpreter::{Limits, RolloutEpisode, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};
+pub use rows::RolloutRows;

@@ -2,7 +2,7 @@
 //!
 //! # Input and output
 //!
-//! [`DatasetTrials`] → a model's folder: `model.safetensors`, `config.json` and the learning curves. While it is under
+//! [`DatasetTrials`] → a model's folder: `model.safetensors`, `metrics.parquet` and `config.json`. While it is under
 //! way the folder holds `checkpoint/`.
 //!
 //! # Invariants
@@ -40,8 +40,12 @@ use crate::model::{
     weights_to_bytes,
 };
 use crate::seed::Seed;
+use crate::table::TableError;
 use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
 use crate::training::curriculum::LevelErrors;
+
+/// Name of the learning curves in a model's folder.
+pub const METRICS_FILE: &str = "metrics.parquet";
 
 /// A training that cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -94,6 +98,9 @@ pub enum TrainError {
         /// The file.
         path: PathBuf,
     },
+    /// The learning curves could not be stored.
+    #[error(transparent)]
+    Metrics(#[from] TableError),
     /// The weights could not be stored.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -223,7 +230,7 @@ impl Run<'_> {
                 checkpoints.save(&learner, &standing)?;
             }
         }
-        self.write(learner.network())?;
+        self.write(learner.network(), &standing.metrics)?;
         checkpoints.clear()?;
         let Standing { step, examples, metrics, errors: _ } = standing;
         Ok(TrainSummary { steps: step, examples, resumed_at, metrics })
@@ -268,9 +275,10 @@ impl Run<'_> {
     }
 
     /// The model's files; `config.json` last, since it says that the model is there.
-    fn write<N: Network>(&self, network: &N) -> Result<(), TrainError> {
+    fn write<N: Network>(&self, network: &N, metrics: &[Metric]) -> Result<(), TrainError> {
         let path = self.folder.join(WEIGHTS_FILE);
         artifact::write(&path, &weights_to_bytes(network, &path)?)?;
+        metrics::write(&self.folder.join(METRICS_FILE), metrics)?;
         artifact::write_json(&self.folder.join(CONFIG_FILE), self.model)?;
         Ok(())
     }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use burn::module::Module;
 use burn::store::{ModuleSnapshot as _, SafetensorsStore};
 use burn::tensor::Device;
+use serde::Serialize;
 
 use crate::artifact::{self, IoError};
 use crate::model::config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
@@ -166,4 +167,27 @@ pub fn load(folder: &Path) -> Result<(ModelConfig, AnyNetwork), ModelError> {
         }
     };
     Ok((config, network))
+}
+
+/// What `ntp inspect` says of a model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelSummary {
+    /// How many numbers were learned.
+    pub parameters: usize,
+    /// Its `config.json`.
+    pub config: ModelConfig,
+}
+
+/// Reads a model and counts its parameters.
+///
+/// # Errors
+///
+/// As [`load`].
+pub fn inspect(folder: &Path) -> Result<ModelSummary, ModelError> {
+    let (config, network) = load(folder)?;
+    let parameters = match network {
+        AnyNetwork::ObjectCentric(network) => network.num_params(),
+        AnyNetwork::Flattened(network) => network.num_params(),
+    };
+    Ok(ModelSummary { parameters, config })
 }

@@ -81,17 +81,23 @@ impl TableReader {
 
     /// Appends the next batch; false at the end.
     fn append_batch(&mut self, columns: &mut [(String, Column)]) -> Result<bool, TableError> {
-        let path = self.path.clone();
-        let batch = guarded(&path, || self.reader.next().transpose().map_err(TableError::arrow(&path)))?;
-        let Some(batch) = batch else { return Ok(false) };
+        let first_row = self.rows_read;
+        let Some(batch) = self.next_batch()? else { return Ok(false) };
         for (name, column) in columns {
-            self.append(name, column, &batch)?;
+            self.append(name, column, &batch, first_row)?;
         }
-        self.rows_read += batch.num_rows() as u64;
         Ok(true)
     }
 
-    fn append(&self, name: &str, column: &mut Column, batch: &RecordBatch) -> Result<(), TableError> {
+    /// The next batch as Arrow arrays; nulls are not yet looked for.
+    pub(crate) fn next_batch(&mut self) -> Result<Option<RecordBatch>, TableError> {
+        let (path, reader) = (&self.path, &mut self.reader);
+        let batch = guarded(path, || reader.next().transpose().map_err(TableError::arrow(path)))?;
+        self.rows_read += batch.as_ref().map_or(0, |batch| batch.num_rows() as u64);
+        Ok(batch)
+    }
+
+    fn append(&self, name: &str, column: &mut Column, batch: &RecordBatch, first_row: u64) -> Result<(), TableError> {
         let expected = column.kind();
         let wrong = |found: String| TableError::ColumnKind {
             path: self.path.clone(),
@@ -106,7 +112,7 @@ impl TableReader {
                 path: self.path.clone(),
                 schema: self.schema,
                 column: name.to_owned(),
-                row: self.rows_read + row as u64,
+                row: first_row + row as u64,
             });
         }
         append_array(column, array).ok_or_else(|| wrong(array.data_type().to_string()))

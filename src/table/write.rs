@@ -31,8 +31,7 @@ const CREATED_BY: &str = concat!("ntp version ", env!("CARGO_PKG_VERSION"));
 /// at `path` that was not before.
 pub fn write(path: &Path, schema: &TableSchema, columns: Vec<(&str, Column)>) -> Result<(), TableError> {
     let mut writer = TableWriter::create(path, schema, WriteOptions::default())?;
-    let arrays = writer.arrays_in_order(columns)?;
-    writer.write(&arrays)?;
+    writer.write_columns(columns)?;
     writer.commit()
 }
 
@@ -69,6 +68,12 @@ impl TableWriter {
         Ok(Self { path: path.to_owned(), schema: *schema, parsed, writer })
     }
 
+    /// Writes rows: the schema's columns in any order.
+    pub(crate) fn write_columns(&mut self, columns: Vec<(&str, Column)>) -> Result<(), TableError> {
+        let arrays = self.arrays_in_order(columns)?;
+        self.write(&arrays)
+    }
+
     /// Writes rows: one array a column in the schema's order. A column of text may come as a dictionary.
     pub(crate) fn write(&mut self, arrays: &[ArrayRef]) -> Result<(), TableError> {
         let fields = self.parsed.arrow.fields().iter().zip(arrays);
@@ -76,6 +81,16 @@ impl TableWriter {
         let batch_schema = Arc::new(Schema::new(fields.collect::<Vec<Field>>()));
         let batch = RecordBatch::try_new(batch_schema, arrays.to_vec()).map_err(TableError::arrow(&self.path))?;
         self.writer.write(&batch).map_err(TableError::parquet(&self.path))
+    }
+
+    /// As [`TableWriter::write`], and the names must be the schema's.
+    pub(crate) fn write_named(&mut self, columns: &[(&str, ArrayRef)]) -> Result<(), TableError> {
+        let expected = self.parsed.columns.iter().map(|(name, _)| name.as_str());
+        if let Some((_, &(found, _))) = expected.clone().zip(columns).find(|(name, (found, _))| name != found) {
+            let (path, schema) = (self.path.clone(), self.schema.name());
+            return Err(TableError::UnknownColumn { path, schema, column: found.to_owned() });
+        }
+        self.write(&columns.iter().map(|(_, array)| Arc::clone(array)).collect::<Vec<_>>())
     }
 
     /// Ends the row group.

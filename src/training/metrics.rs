@@ -1,8 +1,11 @@
-//! Learning curves.
+//! Learning curves, and their table `metrics.parquet` (schemas/parquet/metrics.message).
+
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::program::Program;
+use crate::table::{self, Column, TableError, TableSchema};
 use crate::training::learner::Losses;
 
 /// One row of `metrics.parquet`: the losses of one level in one step.
@@ -43,4 +46,25 @@ impl Metric {
             examples,
         }
     }
+}
+
+/// Writes learning curves.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub(crate) fn write(path: &Path, metrics: &[Metric]) -> Result<(), TableError> {
+    let losses = |loss: fn(&Metric) -> Option<f32>| Column::OptionalFloat32(metrics.iter().map(loss).collect());
+    let columns = vec![
+        ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
+        ("level", Column::Text(metrics.iter().map(|metric| metric.level.name().to_owned()).collect())),
+        ("loss_program", losses(|metric| Some(metric.loss_program))),
+        ("loss_end", losses(|metric| Some(metric.loss_end))),
+        ("loss_scope", losses(|metric| metric.loss_scope)),
+        ("loss_argument", losses(|metric| metric.loss_argument)),
+        ("loss_total", losses(|metric| Some(metric.loss_total))),
+        ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
+        ("examples", Column::Int64(metrics.iter().map(|metric| i64::from(metric.examples)).collect())),
+    ];
+    table::write(path, &TableSchema::METRICS, columns)
 }

@@ -1,0 +1,110 @@
+//! Reads the rows of `ntp/calls/` back into calls.
+
+use crate::dataset::DatasetError;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::episode_rows::EpisodeRow;
+use crate::program::Program;
+use crate::scene::SlotIndex;
+use crate::table::{Columns, TableError};
+use crate::trace::{CallId, ProgramCall, Span};
+
+/// Columns of `ntp/calls/`.
+pub(crate) struct CallBatch {
+    episode_index: Vec<i64>,
+    call_id: Vec<i64>,
+    caller_id: Vec<Option<i64>>,
+    depth: Vec<i64>,
+    step: Vec<i64>,
+    program: Vec<String>,
+    argument_slot: Vec<Option<i64>>,
+    input: [Vec<i64>; 2],
+    output: [Vec<Option<i64>>; 2],
+    frames: [Vec<i64>; 2],
+    end_of_program: Vec<bool>,
+}
+
+impl Batch for CallBatch {
+    const COLUMNS: &'static [&'static str] = &[
+        "episode_index",
+        "call_id",
+        "caller_id",
+        "depth",
+        "step",
+        "program",
+        "argument_slot",
+        "input_begin",
+        "input_end",
+        "output_begin",
+        "output_end",
+        "frame_begin",
+        "frame_end",
+        "end_of_program",
+    ];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            episode_index: columns.int64("episode_index")?,
+            call_id: columns.int64("call_id")?,
+            caller_id: columns.optional_int64("caller_id")?,
+            depth: columns.int64("depth")?,
+            step: columns.int64("step")?,
+            program: columns.text("program")?,
+            argument_slot: columns.optional_int64("argument_slot")?,
+            input: [columns.int64("input_begin")?, columns.int64("input_end")?],
+            output: [columns.optional_int64("output_begin")?, columns.optional_int64("output_end")?],
+            frames: [columns.int64("frame_begin")?, columns.int64("frame_end")?],
+            end_of_program: columns.boolean("end_of_program")?,
+        })
+    }
+}
+
+impl CallBatch {
+    /// The call of a row of an episode, with what is wrong with it as a text.
+    fn call(&self, at: usize, episode_index: i64) -> Result<ProgramCall, String> {
+        if self.episode_index[at] != episode_index {
+            return Err(format!("episode_index is {}, but {episode_index} comes next", self.episode_index[at]));
+        }
+        let small = |name: &str, value: i64| u32::try_from(value).map_err(|_range| format!("{name} is {value}"));
+        let span = |name: &str, begin: i64, end: i64| {
+            let ends = (small(name, begin)?, small(name, end)?);
+            Span::new(ends.0, ends.1).ok_or_else(|| format!("{name} is the empty span {begin}..{end}"))
+        };
+        let output = match (self.output[0][at], self.output[1][at]) {
+            (Some(begin), Some(end)) => Some(span("output", begin, end)?),
+            (None, None) => None,
+            (begin, end) => return Err(format!("output begins at {begin:?} and ends at {end:?}")),
+        };
+        let argument = self.argument_slot[at].map(|slot| small("argument_slot", slot)).transpose()?;
+        let program: Program = self.program[at].parse().map_err(|unknown| format!("{unknown}"))?;
+        Ok(ProgramCall {
+            id: CallId(small("call_id", self.call_id[at])?),
+            caller: self.caller_id[at].map(|caller| small("caller_id", caller)).transpose()?.map(CallId),
+            depth: u8::try_from(self.depth[at]).map_err(|_range| format!("depth is {}", self.depth[at]))?,
+            step: u16::try_from(self.step[at]).map_err(|_range| format!("step is {}", self.step[at]))?,
+            program,
+            argument: argument.map(|slot| SlotIndex(u16::try_from(slot).unwrap_or(u16::MAX))),
+            input: span("input", self.input[0][at], self.input[1][at])?,
+            output,
+            frames: span("frames", self.frames[0][at], self.frames[1][at])?,
+            end_of_program: self.end_of_program[at],
+            prediction: None,
+        })
+    }
+}
+
+/// Reads the calls of the next episode.
+pub(crate) fn read_calls(
+    cursor: &mut Cursor<CallBatch>,
+    row: &EpisodeRow,
+    calls: &mut Vec<ProgramCall>,
+) -> Result<(), DatasetError> {
+    calls.clear();
+    for _ in 0..row.n_calls {
+        let (batch, at) = cursor.next(row.calls)?;
+        match batch.call(at, row.episode_index) {
+            Ok(call) => calls.push(call),
+            Err(problem) => return Err(cursor.problem(problem)),
+        }
+    }
+    Ok(())
+}

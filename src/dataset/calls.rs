@@ -1,0 +1,178 @@
+//! The rows of `ntp/calls/` and `ntp/scopes/`: the program tree and the scoping labels derived from it.
+
+use std::iter::repeat_n;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, Int32Array, Int64Array};
+use arrow::error::ArrowError;
+
+use crate::dataset::episode_view::{CallSpans, EpisodeView};
+use crate::dataset::text::TextTable;
+use crate::program::Program;
+use crate::table::WriteOptions;
+use crate::trace::{ProgramCall, ScopingLabel};
+
+/// Calls that are not yet written.
+#[derive(Default)]
+pub(crate) struct CallRows {
+    episode_index: Vec<i64>,
+    call_id: Vec<i64>,
+    caller_id: Vec<Option<i64>>,
+    depth: Vec<i64>,
+    step: Vec<i64>,
+    program: Vec<i32>,
+    argument_slot: Vec<Option<i64>>,
+    argument: Vec<Option<i32>>,
+    input_begin: Vec<i64>,
+    input_end: Vec<i64>,
+    output_begin: Vec<Option<i64>>,
+    output_end: Vec<Option<i64>>,
+    frame_begin: Vec<i64>,
+    frame_end: Vec<i64>,
+    end_of_program: Vec<bool>,
+    slots: TextTable,
+}
+
+impl CallRows {
+    pub(crate) fn n_rows(&self) -> usize {
+        self.call_id.len()
+    }
+
+    /// What the schema text cannot say of this table.
+    pub(crate) fn options() -> WriteOptions {
+        WriteOptions {
+            delta_encoded: vec!["episode_index", "call_id", "input_begin", "input_end", "frame_begin", "frame_end"],
+            sorted_by: vec!["episode_index", "call_id"],
+            ..WriteOptions::default()
+        }
+    }
+
+    /// Adds an episode's calls.
+    pub(crate) fn append(&mut self, view: &EpisodeView<'_>, episode_index: i64) {
+        for (call, spans) in view.episode.calls.iter().zip(view.spans) {
+            self.append_call(view, call, *spans);
+        }
+        self.episode_index.resize(self.call_id.len(), episode_index);
+    }
+
+    fn append_call(&mut self, view: &EpisodeView<'_>, call: &ProgramCall, spans: CallSpans) {
+        self.call_id.push(i64::from(call.id.0));
+        self.caller_id.push(call.caller.map(|caller| i64::from(caller.0)));
+        self.depth.push(i64::from(call.depth));
+        self.step.push(i64::from(call.step));
+        self.program.push(call.program.index() as i32);
+        self.argument_slot.push(call.argument.map(|slot| i64::from(slot.0)));
+        self.argument.push(call.argument.map(|slot| self.slots.key(&view.episode.scene.slot(slot).name)));
+        self.input_begin.push(i64::from(spans.input.begin));
+        self.input_end.push(i64::from(spans.input.end));
+        self.output_begin.push(spans.output.map(|span| i64::from(span.begin)));
+        self.output_end.push(spans.output.map(|span| i64::from(span.end)));
+        self.frame_begin.push(i64::from(spans.frames.begin));
+        self.frame_end.push(i64::from(spans.frames.end));
+        self.end_of_program.push(call.end_of_program);
+    }
+
+    /// Takes all rows out as columns.
+    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
+        let mut programs = TextTable::default();
+        for program in Program::ALL {
+            programs.key(program.name());
+        }
+        Ok(vec![
+            ("episode_index", int64(&mut self.episode_index)),
+            ("call_id", int64(&mut self.call_id)),
+            ("caller_id", optional_int64(&mut self.caller_id)),
+            ("depth", int64(&mut self.depth)),
+            ("step", int64(&mut self.step)),
+            ("program", programs.column(Int32Array::from(std::mem::take(&mut self.program)))?),
+            ("argument_slot", optional_int64(&mut self.argument_slot)),
+            ("argument", self.slots.column(Int32Array::from(std::mem::take(&mut self.argument)))?),
+            ("input_begin", int64(&mut self.input_begin)),
+            ("input_end", int64(&mut self.input_end)),
+            ("output_begin", optional_int64(&mut self.output_begin)),
+            ("output_end", optional_int64(&mut self.output_end)),
+            ("frame_begin", int64(&mut self.frame_begin)),
+            ("frame_end", int64(&mut self.frame_end)),
+            ("end_of_program", Arc::new(BooleanArray::from(std::mem::take(&mut self.end_of_program)))),
+        ])
+    }
+}
+
+/// Scoping labels that are not yet written: for each call with an output, each frame of its input.
+#[derive(Default)]
+pub(crate) struct ScopeRows {
+    episode_index: Vec<i64>,
+    call_id: Vec<i64>,
+    specification_frame: Vec<i64>,
+    label: Vec<i32>,
+    is_start: Vec<bool>,
+    is_end: Vec<bool>,
+}
+
+impl ScopeRows {
+    pub(crate) fn n_rows(&self) -> usize {
+        self.call_id.len()
+    }
+
+    /// What the schema text cannot say of this table.
+    pub(crate) fn options() -> WriteOptions {
+        WriteOptions {
+            delta_encoded: vec!["episode_index", "call_id", "specification_frame"],
+            sorted_by: vec!["episode_index", "call_id", "specification_frame"],
+            ..WriteOptions::default()
+        }
+    }
+
+    /// Adds an episode's labels; returns how many.
+    pub(crate) fn append(&mut self, view: &EpisodeView<'_>, episode_index: i64) -> usize {
+        let before = self.n_rows();
+        for (call, spans) in view.episode.calls.iter().zip(view.spans) {
+            self.append_call(i64::from(call.id.0), *spans);
+        }
+        let n_after = self.n_rows();
+        self.episode_index.resize(n_after, episode_index);
+        n_after - before
+    }
+
+    fn append_call(&mut self, call_id: i64, spans: CallSpans) {
+        let Some(output) = spans.output else { return };
+        let input = spans.input;
+        self.call_id.extend(repeat_n(call_id, input.len()));
+        self.specification_frame.extend(i64::from(input.begin)..i64::from(input.end));
+        let first = self.label.len();
+        self.label.resize(first + input.len(), ScopingLabel::Outside as i32);
+        self.is_start.resize(first + input.len(), false);
+        self.is_end.resize(first + input.len(), false);
+        let at = |frame: u32| first + (frame - input.begin) as usize;
+        self.label[at(output.begin)..=at(output.last())].fill(ScopingLabel::Inside as i32);
+        for frame in [output.last(), output.begin] {
+            self.label[at(frame)] = output.label(frame) as i32;
+        }
+        self.is_start[at(output.begin)] = true;
+        self.is_end[at(output.last())] = true;
+    }
+
+    /// Takes all rows out as columns.
+    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
+        let mut labels = TextTable::default();
+        for label in ScopingLabel::ALL {
+            labels.key(label.name());
+        }
+        Ok(vec![
+            ("episode_index", int64(&mut self.episode_index)),
+            ("call_id", int64(&mut self.call_id)),
+            ("specification_frame", int64(&mut self.specification_frame)),
+            ("label", labels.column(Int32Array::from(std::mem::take(&mut self.label)))?),
+            ("is_start", Arc::new(BooleanArray::from(std::mem::take(&mut self.is_start)))),
+            ("is_end", Arc::new(BooleanArray::from(std::mem::take(&mut self.is_end)))),
+        ])
+    }
+}
+
+fn int64(values: &mut Vec<i64>) -> ArrayRef {
+    Arc::new(Int64Array::from(std::mem::take(values)))
+}
+
+fn optional_int64(values: &mut Vec<Option<i64>>) -> ArrayRef {
+    Arc::new(Int64Array::from(std::mem::take(values)))
+}

@@ -1,0 +1,127 @@
+//! Reads the rows of a table in many files one after another, and knows where each one is.
+
+use std::path::{Path, PathBuf};
+
+use crate::dataset::DatasetError;
+use crate::dataset::layout::FilePlace;
+use crate::table::{Columns, TableError, TableReader, TableSchema};
+
+/// Columns of a batch of rows.
+pub(crate) trait Batch: Sized {
+    /// Names of the columns that are read.
+    const COLUMNS: &'static [&'static str];
+
+    /// Takes the columns.
+    fn take(columns: &mut Columns) -> Result<Self, TableError>;
+}
+
+/// A place among the rows of the files of one folder.
+pub(crate) struct Cursor<B> {
+    root: PathBuf,
+    folder: &'static str,
+    schema: TableSchema,
+    open: Option<OpenFile<B>>,
+}
+
+struct OpenFile<B> {
+    place: FilePlace,
+    reader: TableReader,
+    batch: Option<(B, usize)>,
+    at: usize,
+    /// Of the file; the one that was read last.
+    row: Option<u64>,
+}
+
+impl<B: Batch> Cursor<B> {
+    pub(crate) fn new(root: &Path, folder: &'static str, schema: TableSchema) -> Self {
+        Self { root: root.to_owned(), folder, schema, open: None }
+    }
+
+    /// Reads the next row, which must be in the file `place`: the one before must then have ended.
+    pub(crate) fn next(&mut self, place: FilePlace) -> Result<(&B, usize), DatasetError> {
+        if self.open.as_ref().is_none_or(|open| open.place != place) {
+            self.finish()?;
+            self.open = Some(self.open_file(place)?);
+        }
+        let has_row = match &mut self.open {
+            Some(open) => open.advance()?,
+            None => false,
+        };
+        let row = self.open.as_ref().filter(|_| has_row).and_then(|open| Some((&open.batch.as_ref()?.0, open.at)));
+        row.ok_or_else(|| self.count("it ends before the rows that it should have"))
+    }
+
+    /// Reads the next row, of the file that is open or, when it has ended, of the one after it.
+    pub(crate) fn next_in_order(&mut self) -> Result<(&B, usize), DatasetError> {
+        let place = match &self.open {
+            None => FilePlace::default(),
+            Some(open) if open.has_more() => open.place,
+            Some(open) => open.place.next(),
+        };
+        self.next(place)
+    }
+
+    /// Makes sure that nothing is left of the open file.
+    pub(crate) fn finish(&self) -> Result<(), DatasetError> {
+        match &self.open {
+            Some(open) if open.has_more() => Err(self.count("it has more rows than it should have")),
+            _ => Ok(()),
+        }
+    }
+
+    fn count(&self, problem: &str) -> DatasetError {
+        DatasetError::Count { path: self.path(), problem: problem.to_owned() }
+    }
+
+    /// The file of the row that was read last.
+    pub(crate) fn path(&self) -> PathBuf {
+        let place = self.open.as_ref().map_or(FilePlace::default(), |open| open.place);
+        place.in_dataset(&self.root, self.folder)
+    }
+
+    /// Names the row that was read last.
+    pub(crate) fn problem(&self, problem: String) -> DatasetError {
+        let row = self.open.as_ref().and_then(|open| open.row).unwrap_or(0);
+        DatasetError::Row { path: self.path(), row, problem }
+    }
+
+    fn open_file(&self, place: FilePlace) -> Result<OpenFile<B>, DatasetError> {
+        let path = place.in_dataset(&self.root, self.folder);
+        let reader = TableReader::open_columns(&path, &self.schema, B::COLUMNS)?;
+        Ok(OpenFile { place, reader, batch: None, at: 0, row: None })
+    }
+}
+
+impl<B: Batch> OpenFile<B> {
+    /// Steps to the next row; false at the end of the file.
+    fn advance(&mut self) -> Result<bool, DatasetError> {
+        if !self.has_more() {
+            return Ok(false);
+        }
+        self.at = if self.row.is_some() { self.at + 1 } else { 0 };
+        self.row = Some(self.row.map_or(0, |row| row + 1));
+        self.take_batch_if_spent()?;
+        Ok(true)
+    }
+
+    fn has_more(&self) -> bool {
+        self.row.map_or(0, |row| row + 1) < self.reader.n_rows()
+    }
+
+    fn take_batch_if_spent(&mut self) -> Result<(), DatasetError> {
+        while self.batch.as_ref().is_none_or(|(_, n_rows)| self.at >= *n_rows) {
+            let Some(columns) = self.reader.next() else {
+                let path = self.reader.path().to_owned();
+                return Err(DatasetError::Count {
+                    path,
+                    problem: "its footer counts rows that are not there".to_owned(),
+                });
+            };
+            let mut columns = columns?;
+            let n_rows = columns.n_rows();
+            self.batch = Some((B::take(&mut columns)?, n_rows));
+            self.at = 0;
+        }
+        Ok(())
+    }
+}

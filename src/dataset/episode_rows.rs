@@ -1,0 +1,237 @@
+//! The episodes of a dataset: `ntp/episodes.parquet` and `meta/episodes/` side by side.
+
+use std::path::{Path, PathBuf};
+
+use crate::artifact::read_json;
+use crate::dataset::DatasetError;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::info::Info;
+use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::schema::{EPISODES, META_EPISODES};
+use crate::table::{Columns, TableError, TableReader};
+
+/// One episode's row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EpisodeRow {
+    pub(crate) episode_index: i64,
+    pub(crate) task_id: String,
+    pub(crate) task_text: String,
+    pub(crate) family: String,
+    pub(crate) split: String,
+    pub(crate) trial: i64,
+    pub(crate) actor: String,
+    pub(crate) outcome: String,
+    pub(crate) cause: Option<String>,
+    pub(crate) is_success: bool,
+    pub(crate) specification: String,
+    pub(crate) specification_frames: i64,
+    pub(crate) n_frames: i64,
+    pub(crate) n_calls: i64,
+    pub(crate) n_scopes: i64,
+    pub(crate) data: FilePlace,
+    pub(crate) first_index: i64,
+    pub(crate) calls: FilePlace,
+    pub(crate) first_call: i64,
+    pub(crate) scopes: FilePlace,
+    pub(crate) first_scope: i64,
+}
+
+struct MetaBatch {
+    episode_index: Vec<i64>,
+    tasks: Vec<Vec<String>>,
+    length: Vec<i64>,
+    chunk: Vec<i64>,
+    file: Vec<i64>,
+    from: Vec<i64>,
+    to: Vec<i64>,
+}
+
+impl Batch for MetaBatch {
+    const COLUMNS: &'static [&'static str] = &[
+        "episode_index",
+        "tasks",
+        "length",
+        "data/chunk_index",
+        "data/file_index",
+        "dataset_from_index",
+        "dataset_to_index",
+    ];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            episode_index: columns.int64("episode_index")?,
+            tasks: columns.text_list("tasks")?,
+            length: columns.int64("length")?,
+            chunk: columns.int64("data/chunk_index")?,
+            file: columns.int64("data/file_index")?,
+            from: columns.int64("dataset_from_index")?,
+            to: columns.int64("dataset_to_index")?,
+        })
+    }
+}
+
+/// Reads the episodes in order.
+pub(crate) struct EpisodeRows {
+    path: PathBuf,
+    reader: TableReader,
+    meta: Cursor<MetaBatch>,
+    batch: std::vec::IntoIter<EpisodeRow>,
+    total: i64,
+    n_read: i64,
+    next_index: i64,
+    next_call: i64,
+    next_scope: i64,
+}
+
+impl EpisodeRows {
+    /// Opens the episodes of a dataset and reads its `meta/info.json`.
+    pub(crate) fn open(root: &Path) -> Result<(Info, Self), DatasetError> {
+        let info: Info = read_json(&root.join(layout::INFO))?;
+        let path = root.join(layout::EPISODES);
+        let columns = EPISODES.columns()?;
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        let reader = TableReader::open_columns(&path, &EPISODES, &names)?;
+        if reader.n_rows() != info.total_episodes {
+            let (found, expected) = (reader.n_rows(), info.total_episodes);
+            let problem = format!("it has {found} rows, but {} says {expected} episodes", layout::INFO);
+            return Err(DatasetError::Count { path, problem });
+        }
+        let rows = Self {
+            path,
+            reader,
+            meta: Cursor::new(root, layout::META_EPISODES, META_EPISODES),
+            batch: Vec::new().into_iter(),
+            total: info.total_episodes as i64,
+            n_read: 0,
+            next_index: 0,
+            next_call: 0,
+            next_scope: 0,
+        };
+        Ok((info, rows))
+    }
+
+    /// The file with the provenance.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn read_next(&mut self) -> Result<Option<EpisodeRow>, DatasetError> {
+        if self.n_read == self.total {
+            self.meta.finish()?;
+            return Ok(None);
+        }
+        while self.batch.as_slice().is_empty() {
+            match self.reader.next() {
+                Some(columns) => self.batch = take_rows(&mut columns?)?.into_iter(),
+                None => return Err(self.problem("its footer counts rows that are not there".to_owned())),
+            }
+        }
+        let Some(row) = self.batch.next() else { return Ok(None) };
+        let row = self.with_meta(row)?;
+        self.check_order(&row)?;
+        self.n_read += 1;
+        self.next_index += row.n_frames;
+        self.next_call += row.n_calls;
+        self.next_scope += row.n_scopes;
+        Ok(Some(row))
+    }
+
+    /// Adds where the frames are.
+    fn with_meta(&mut self, mut row: EpisodeRow) -> Result<EpisodeRow, DatasetError> {
+        let (meta, at) = self.meta.next_in_order()?;
+        row.data = place(meta.chunk[at], meta.file[at]);
+        row.first_index = meta.from[at];
+        let found = (meta.episode_index[at], meta.length[at], meta.to[at]);
+        let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
+        let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
+        if found != expected {
+            return Err(self.meta.problem(format!(
+                "(episode_index, length, dataset_to_index) are {found:?}, but {} makes them {expected:?}",
+                layout::EPISODES
+            )));
+        }
+        if !tasks_agree {
+            return Err(self.meta.problem(format!("its tasks are not the one of {}", layout::EPISODES)));
+        }
+        Ok(row)
+    }
+
+    fn check_order(&self, row: &EpisodeRow) -> Result<(), DatasetError> {
+        let numbers = [
+            ("episode_index", row.episode_index, self.n_read),
+            ("calls_from_index", row.first_call, self.next_call),
+            ("scopes_from_index", row.first_scope, self.next_scope),
+        ];
+        if let Some((name, found, expected)) = numbers.into_iter().find(|(_, found, expected)| found != expected) {
+            return Err(self.problem(format!("{name} is {found}, but {expected} comes next")));
+        }
+        let too_few = [("n_frames", row.n_frames), ("n_calls", row.n_calls)].into_iter().find(|(_, n)| *n < 1);
+        if let Some((name, found)) = too_few {
+            return Err(self.problem(format!("{name} is {found}, but an episode has at least 1")));
+        }
+        if row.first_index != self.next_index {
+            let (found, expected) = (row.first_index, self.next_index);
+            return Err(self.meta.problem(format!("dataset_from_index is {found}, but {expected} comes next")));
+        }
+        Ok(())
+    }
+
+    /// Names the row that is being read.
+    fn problem(&self, problem: String) -> DatasetError {
+        DatasetError::Row { path: self.path.clone(), row: self.n_read as u64, problem }
+    }
+}
+
+impl Iterator for EpisodeRows {
+    type Item = Result<EpisodeRow, DatasetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.read_next().transpose()
+    }
+}
+
+fn place(chunk: i64, file: i64) -> FilePlace {
+    FilePlace { chunk: u32::try_from(chunk).unwrap_or(u32::MAX), file: u32::try_from(file).unwrap_or(u32::MAX) }
+}
+
+fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
+    let n_rows = columns.n_rows();
+    let mut text = |name| Ok::<_, TableError>(columns.text(name)?.into_iter());
+    let [mut task_id, mut task_text, mut family] = [text("task_id")?, text("task_text")?, text("family")?];
+    let [mut split, mut actor, mut outcome] = [text("split")?, text("actor")?, text("outcome")?];
+    let mut specification = text("specification")?;
+    let mut cause = columns.optional_text("cause")?.into_iter();
+    let success = columns.boolean("success")?;
+    let mut number = |name| columns.int64(name);
+    let (episode_index, trial) = (number("episode_index")?, number("trial")?);
+    let (specification_frames, n_frames) = (number("specification_frames")?, number("n_frames")?);
+    let (n_calls, n_scopes) = (number("n_calls")?, number("n_scopes")?);
+    let calls = [number("calls/chunk_index")?, number("calls/file_index")?, number("calls_from_index")?];
+    let scopes = [number("scopes/chunk_index")?, number("scopes/file_index")?, number("scopes_from_index")?];
+    let row = |at: usize| {
+        Some(EpisodeRow {
+            episode_index: episode_index[at],
+            task_id: task_id.next()?,
+            task_text: task_text.next()?,
+            family: family.next()?,
+            split: split.next()?,
+            trial: trial[at],
+            actor: actor.next()?,
+            outcome: outcome.next()?,
+            cause: cause.next()?,
+            is_success: success[at],
+            specification: specification.next()?,
+            specification_frames: specification_frames[at],
+            n_frames: n_frames[at],
+            n_calls: n_calls[at],
+            n_scopes: n_scopes[at],
+            data: FilePlace::default(),
+            first_index: 0,
+            calls: place(calls[0][at], calls[1][at]),
+            first_call: calls[2][at],
+            scopes: place(scopes[0][at], scopes[1][at]),
+            first_scope: scopes[2][at],
+        })
+    };
+    Ok((0..n_rows).filter_map(row).collect())
+}

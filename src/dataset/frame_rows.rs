@@ -1,0 +1,73 @@
+//! Reads the rows of `data/` back.
+
+use crate::dataset::DatasetError;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::episode_rows::EpisodeRow;
+use crate::table::{Columns, TableError};
+
+/// The columns of `data/` that a learner of programs needs.
+pub(crate) struct FrameBatch {
+    pub(crate) state: Vec<Vec<f32>>,
+    pub(crate) frame_index: Vec<i64>,
+    pub(crate) episode_index: Vec<i64>,
+    pub(crate) index: Vec<i64>,
+    pub(crate) boundary: Vec<bool>,
+}
+
+impl Batch for FrameBatch {
+    const COLUMNS: &'static [&'static str] =
+        &["observation.state", "frame_index", "episode_index", "index", "ntp.boundary"];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            state: columns.float32_list("observation.state")?,
+            frame_index: columns.int64("frame_index")?,
+            episode_index: columns.int64("episode_index")?,
+            index: columns.int64("index")?,
+            boundary: columns.boolean("ntp.boundary")?,
+        })
+    }
+}
+
+impl FrameBatch {
+    /// What is wrong with a row that should be frame `frame` of an episode.
+    fn problem(&self, at: usize, row: &EpisodeRow, frame: i64, width: usize) -> Option<String> {
+        let numbers = [
+            ("index", self.index[at], row.first_index + frame),
+            ("episode_index", self.episode_index[at], row.episode_index),
+            ("frame_index", self.frame_index[at], frame),
+            ("the length of observation.state", self.state[at].len() as i64, width as i64),
+        ];
+        let wrong = numbers.into_iter().find(|(_, found, expected)| found != expected);
+        let wrong = wrong.map(|(name, found, expected)| format!("{name} is {found}, but should be {expected}"));
+        let finite = self.state[at].iter().all(|value| value.is_finite());
+        wrong.or_else(|| (!finite).then(|| "observation.state is not finite".to_owned()))
+    }
+}
+
+/// The boundary observations of an episode, one after another, and which rows are boundaries.
+#[derive(Debug, Default)]
+pub(crate) struct EpisodeFrames {
+    pub(crate) observations: Vec<f32>,
+    pub(crate) is_boundary: Vec<bool>,
+}
+
+/// Reads the frames of the next episode.
+pub(crate) fn read_frames(
+    cursor: &mut Cursor<FrameBatch>,
+    row: &EpisodeRow,
+    width: usize,
+) -> Result<EpisodeFrames, DatasetError> {
+    let mut frames = EpisodeFrames::default();
+    for frame in 0..row.n_frames {
+        let (batch, at) = cursor.next(row.data)?;
+        if let Some(problem) = batch.problem(at, row, frame, width) {
+            return Err(cursor.problem(problem));
+        }
+        frames.is_boundary.push(batch.boundary[at]);
+        if batch.boundary[at] {
+            frames.observations.extend_from_slice(&batch.state[at]);
+        }
+    }
+    Ok(frames)
+}

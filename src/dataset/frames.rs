@@ -1,0 +1,269 @@
+//! The rows of `data/`: one per frame, a column per feature.
+//!
+//! Rows of several episodes are gathered until they are worth a row group; then the buffers begin anew.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use arrow::array::{
+    Array as _, ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Float64Array, Int32Array, Int64Array,
+};
+use arrow::datatypes::{DataType, Field};
+use arrow::error::ArrowError;
+
+use crate::dataset::episode_view::EpisodeView;
+use crate::dataset::feature::{ACTION_NAMES, FEATURES, Width};
+use crate::dataset::statistics::Numbers;
+use crate::dataset::text::TextTable;
+use crate::program::Program;
+use crate::scene::SlotIndex;
+use crate::table::WriteOptions;
+use crate::trace::{Frame, Observation};
+
+const POSITION_WIDTH: usize = 3;
+
+/// The numbers that all rows of an episode share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EpisodeIds {
+    pub(crate) episode_index: i64,
+    pub(crate) first_index: i64,
+    pub(crate) task_index: i64,
+    pub(crate) fps: u32,
+}
+
+/// Rows that are not yet written.
+pub(crate) struct FrameRows {
+    n_slots: usize,
+    state: Vec<f32>,
+    action: Vec<f32>,
+    timestamp: Vec<f32>,
+    frame_index: Vec<i64>,
+    episode_index: Vec<i64>,
+    index: Vec<i64>,
+    task_index: Vec<i64>,
+    subtask_index: Vec<i64>,
+    done: Vec<bool>,
+    success: Vec<bool>,
+    time_secs: Vec<f64>,
+    boundary: Vec<bool>,
+    recording_frame: Vec<i64>,
+    gripper: Vec<f32>,
+    call_id: Vec<i64>,
+    program: Vec<i32>,
+    paths: Paths,
+    subtasks: TextTable,
+}
+
+impl FrameRows {
+    pub(crate) fn new(n_slots: usize) -> Self {
+        Self {
+            n_slots,
+            state: Vec::new(),
+            action: Vec::new(),
+            timestamp: Vec::new(),
+            frame_index: Vec::new(),
+            episode_index: Vec::new(),
+            index: Vec::new(),
+            task_index: Vec::new(),
+            subtask_index: Vec::new(),
+            done: Vec::new(),
+            success: Vec::new(),
+            time_secs: Vec::new(),
+            boundary: Vec::new(),
+            recording_frame: Vec::new(),
+            gripper: Vec::new(),
+            call_id: Vec::new(),
+            program: Vec::new(),
+            paths: Paths::default(),
+            subtasks: TextTable::default(),
+        }
+    }
+
+    pub(crate) fn n_rows(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Texts of `subtask_index`, in order.
+    pub(crate) fn subtasks(&self) -> &[String] {
+        self.subtasks.texts()
+    }
+
+    /// What the schema text cannot say of this table.
+    pub(crate) fn options(n_slots: usize) -> WriteOptions {
+        let vectors = FEATURES.iter().filter(|feature| feature.width != Width::Scalar);
+        WriteOptions {
+            list_lengths: vectors.map(|feature| (feature.name, feature.width(n_slots) as i32)).collect(),
+            delta_encoded: vec!["frame_index", "episode_index", "index", "ntp.recording_frame"],
+            sorted_by: vec!["episode_index", "frame_index"],
+            metadata: Vec::new(),
+        }
+    }
+
+    /// Adds an episode's rows.
+    pub(crate) fn append(&mut self, view: &EpisodeView<'_>, ids: EpisodeIds) {
+        let n_rows = view.n_rows();
+        let is_success = view.episode.outcome.is_success();
+        for (row, (recorded, frame)) in view.frames().enumerate() {
+            let is_last = row + 1 == n_rows;
+            append_state(&mut self.state, frame);
+            self.timestamp.push((row as f64 / f64::from(ids.fps)) as f32);
+            self.frame_index.push(row as i64);
+            self.index.push(ids.first_index + row as i64);
+            self.done.push(is_last);
+            self.success.push(is_last && is_success);
+            self.time_secs.push(frame.time_nanos as f64 * 1e-9);
+            self.boundary.push(frame.boundary);
+            self.recording_frame.push(i64::from(recorded));
+            self.gripper.extend(frame.state.gripper_in_world.translation.vector.iter());
+        }
+        let n_after = self.index.len();
+        self.episode_index.resize(n_after, ids.episode_index);
+        self.task_index.resize(n_after, ids.task_index);
+        self.append_actions(n_rows);
+        self.append_calls(view);
+    }
+
+    fn append_actions(&mut self, n_rows: usize) {
+        let first = self.index.len() - n_rows;
+        let closed_at = |row: usize| (row + 1) * Observation::width(self.n_slots) - 1;
+        for row in first..first + n_rows {
+            let next = (row + 1).min(first + n_rows - 1);
+            let (here, there) = (POSITION_WIDTH * row, POSITION_WIDTH * next);
+            self.action.extend((0..POSITION_WIDTH).map(|axis| self.gripper[there + axis] - self.gripper[here + axis]));
+            self.action.push(self.state[closed_at(next)]);
+        }
+    }
+
+    /// Labels each row with the deepest call that goes on from it to the next row. The root goes on from every row.
+    fn append_calls(&mut self, view: &EpisodeView<'_>) {
+        let first = self.call_id.len();
+        let calls = &view.episode.calls;
+        let root = calls[0].program;
+        let root_path = self.paths.key(None, root);
+        let root_text = i64::from(self.subtasks.key(root.name()));
+        self.call_id.resize(first + view.n_rows(), 0);
+        self.program.resize(first + view.n_rows(), root_path);
+        self.subtask_index.resize(first + view.n_rows(), root_text);
+        self.paths.of_call.clear();
+        for (position, (call, spans)) in calls.iter().zip(view.spans).enumerate() {
+            let caller = call.caller.map(|caller| self.paths.of_call[caller.0 as usize]);
+            let path = self.paths.key(caller, call.program);
+            self.paths.of_call.push(path);
+            let rows = first + spans.frames.begin as usize..first + spans.frames.last() as usize;
+            if call.depth > 0 && !rows.is_empty() {
+                self.call_id[rows.clone()].fill(position as i64);
+                self.program[rows.clone()].fill(path);
+            }
+            if call.depth == 1 && !rows.is_empty() {
+                let text = subtask_text(view, position);
+                self.subtask_index[rows].fill(i64::from(self.subtasks.key(&text)));
+            }
+        }
+    }
+
+    /// The numeric columns in the order of the features, each with the values of all rows.
+    pub(crate) fn numbers(&self) -> [Numbers<'_>; 15] {
+        [
+            Numbers::Float32(&self.state),
+            Numbers::Float32(&self.action),
+            Numbers::Float32(&self.timestamp),
+            Numbers::Int64(&self.frame_index),
+            Numbers::Int64(&self.episode_index),
+            Numbers::Int64(&self.index),
+            Numbers::Int64(&self.task_index),
+            Numbers::Int64(&self.subtask_index),
+            Numbers::Boolean(&self.done),
+            Numbers::Boolean(&self.success),
+            Numbers::Float64(&self.time_secs),
+            Numbers::Boolean(&self.boundary),
+            Numbers::Int64(&self.recording_frame),
+            Numbers::Float32(&self.gripper),
+            Numbers::Int64(&self.call_id),
+        ]
+    }
+
+    /// Takes all rows out as columns.
+    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
+        let width = Observation::width(self.n_slots);
+        let columns: [ArrayRef; FEATURES.len()] = [
+            vectors(&mut self.state, width)?,
+            vectors(&mut self.action, ACTION_NAMES.len())?,
+            Arc::new(Float32Array::from(std::mem::take(&mut self.timestamp))),
+            int64(&mut self.frame_index),
+            int64(&mut self.episode_index),
+            int64(&mut self.index),
+            int64(&mut self.task_index),
+            int64(&mut self.subtask_index),
+            boolean(&mut self.done),
+            boolean(&mut self.success),
+            Arc::new(Float64Array::from(std::mem::take(&mut self.time_secs))),
+            boolean(&mut self.boundary),
+            int64(&mut self.recording_frame),
+            vectors(&mut self.gripper, POSITION_WIDTH)?,
+            int64(&mut self.call_id),
+            self.paths.texts.column(Int32Array::from(std::mem::take(&mut self.program)))?,
+        ];
+        Ok(FEATURES.iter().map(|feature| feature.name).zip(columns).collect())
+    }
+}
+
+/// As [`Observation::to_flat`], without an allocation per frame.
+fn append_state(flat: &mut Vec<f32>, frame: &Frame) {
+    let gripper = frame.state.gripper_in_world.translation.vector;
+    for &body in &frame.slots {
+        let position = frame.state.body_in_world(body).translation.vector - gripper;
+        flat.extend(position.iter());
+    }
+    let closed = f32::from(u8::from(frame.state.held.is_some()));
+    flat.extend([1.0 - closed, closed]);
+}
+
+/// A call of the root with the slots that are moved to below it, in order of first use.
+fn subtask_text(view: &EpisodeView<'_>, position: usize) -> String {
+    let calls = &view.episode.calls;
+    let below = calls[position + 1..].iter().take_while(|call| call.depth > calls[position].depth);
+    let mut arguments: Vec<SlotIndex> = Vec::new();
+    for slot in below.filter_map(|call| call.argument) {
+        if !arguments.contains(&slot) {
+            arguments.push(slot);
+        }
+    }
+    let names: Vec<&str> = arguments.iter().map(|&slot| view.episode.scene.slot(slot).name.as_str()).collect();
+    format!("{} {}", calls[position].program, names.join(" ")).trim_end().to_owned()
+}
+
+/// Stacks of running programs, as texts `block_stacking/pick_and_place/pick`.
+#[derive(Default)]
+struct Paths {
+    texts: TextTable,
+    keys: HashMap<(Option<i32>, Program), i32>,
+    of_call: Vec<i32>,
+}
+
+impl Paths {
+    fn key(&mut self, caller: Option<i32>, program: Program) -> i32 {
+        let texts = &mut self.texts;
+        *self.keys.entry((caller, program)).or_insert_with(|| match caller {
+            None => texts.key(program.name()),
+            Some(caller) => {
+                let path = format!("{}/{program}", texts.texts()[caller as usize]);
+                texts.key(&path)
+            }
+        })
+    }
+}
+
+fn int64(values: &mut Vec<i64>) -> ArrayRef {
+    Arc::new(Int64Array::from(std::mem::take(values)))
+}
+
+fn boolean(values: &mut Vec<bool>) -> ArrayRef {
+    Arc::new(BooleanArray::from(std::mem::take(values)))
+}
+
+fn vectors(values: &mut Vec<f32>, width: usize) -> Result<ArrayRef, ArrowError> {
+    let values = Float32Array::from(std::mem::take(values));
+    let element = Field::new("element", values.data_type().clone(), false);
+    debug_assert_eq!(values.data_type(), &DataType::Float32);
+    Ok(Arc::new(FixedSizeListArray::try_new(Arc::new(element), width as i32, Arc::new(values), None)?))
+}

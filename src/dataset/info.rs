@@ -1,0 +1,118 @@
+//! The JSON files of a dataset: `meta/info.json`, `meta/stats.json` and `ntp/info.json`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::dataset::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::layout::CHUNK_FILES;
+use crate::dataset::statistics::FeatureStatistics;
+
+/// The format that `meta/` and `data/` follow.
+pub(crate) const LEROBOT_VERSION: &str = "v3.0";
+/// The format that `ntp/` follows.
+pub(crate) const NTP_VERSION: u32 = 1;
+const VIDEO_FILE_MEGABYTES: u32 = 200;
+
+/// `meta/info.json`. Templates and order of keys are `LeRobot`'s own: some readers take them literally.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Info {
+    pub(crate) codebase_version: String,
+    pub(crate) robot_type: String,
+    pub(crate) total_episodes: u64,
+    pub(crate) total_frames: u64,
+    pub(crate) total_tasks: u64,
+    pub(crate) chunks_size: u32,
+    pub(crate) data_files_size_in_mb: u32,
+    pub(crate) video_files_size_in_mb: u32,
+    pub(crate) fps: u32,
+    pub(crate) splits: BTreeMap<String, String>,
+    pub(crate) data_path: String,
+    pub(crate) video_path: String,
+    #[serde(serialize_with = "in_order")]
+    pub(crate) features: Features,
+}
+
+/// Features in the order of their columns; as read, in that of their names.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(from = "BTreeMap<String, FeatureInfo>")]
+pub(crate) struct Features(pub(crate) Vec<(String, FeatureInfo)>);
+
+/// One feature of `meta/info.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FeatureInfo {
+    pub(crate) dtype: Dtype,
+    pub(crate) shape: Vec<usize>,
+    pub(crate) names: Option<Vec<String>>,
+}
+
+/// What a dataset counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Totals {
+    pub(crate) episodes: u64,
+    pub(crate) frames: u64,
+    pub(crate) tasks: u64,
+}
+
+impl From<BTreeMap<String, FeatureInfo>> for Features {
+    fn from(features: BTreeMap<String, FeatureInfo>) -> Self {
+        Self(features.into_iter().collect())
+    }
+}
+
+fn in_order<S: Serializer>(features: &Features, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(features.0.iter().map(|(name, feature)| (name, feature)))
+}
+
+impl Info {
+    pub(crate) fn new(totals: Totals, slots: &[String], fps: u32, file_megabytes: u32) -> Self {
+        Self {
+            codebase_version: LEROBOT_VERSION.to_owned(),
+            robot_type: "ntp_gripper".to_owned(),
+            total_episodes: totals.episodes,
+            total_frames: totals.frames,
+            total_tasks: totals.tasks,
+            chunks_size: CHUNK_FILES,
+            data_files_size_in_mb: file_megabytes,
+            video_files_size_in_mb: VIDEO_FILE_MEGABYTES,
+            fps,
+            splits: BTreeMap::from([("train".to_owned(), format!("0:{}", totals.episodes))]),
+            data_path: "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet".to_owned(),
+            video_path: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4".to_owned(),
+            features: Features(FEATURES.iter().map(|feature| declared(feature, slots)).collect()),
+        }
+    }
+}
+
+fn declared(feature: &Feature, slots: &[String]) -> (String, FeatureInfo) {
+    let shape = vec![feature.width(slots.len())];
+    (feature.name.to_owned(), FeatureInfo { dtype: feature.dtype, shape, names: feature.value_names(slots) })
+}
+
+/// `meta/stats.json`: statistics by feature, in the order of the columns.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Stats(pub(crate) Vec<(&'static str, FeatureStatistics)>);
+
+impl Serialize for Stats {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, statistics)| (name, statistics)))
+    }
+}
+
+/// `ntp/info.json`: what the program tables are made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NtpInfo {
+    pub(crate) schema_version: u32,
+    pub(crate) ntp_version: String,
+    pub(crate) frames: String,
+    pub(crate) families: Vec<String>,
+    pub(crate) n_slots: usize,
+    /// Names of the slots where all episodes have the same, else `slot_0` and so on.
+    pub(crate) slots: Vec<String>,
+    pub(crate) vocabulary: Vec<String>,
+    pub(crate) vocabulary_hash: String,
+    pub(crate) total_calls: u64,
+    pub(crate) total_scopes: u64,
+    pub(crate) failed_left_out: u64,
+}
