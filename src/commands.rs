@@ -1,1 +1,84 @@
-//! One file a command.
+//! One file a command. Commands read the command line, call the library, and print: results to stdout, the rest to
+//! stderr.
+
+mod completions;
+mod inspect;
+mod kind;
+mod output;
+mod replay;
+mod stages;
+mod tasks;
+mod validate;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::cli::{Cli, Command};
+use crate::pipeline::{PipelineError, Stage};
+
+/// How a command ended when it did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandOutcome {
+    /// All was done.
+    Done,
+    /// Done, but something was left out.
+    LeftOut,
+    /// A check found something wrong.
+    CheckFailed,
+}
+
+/// A mistake in how the command was used.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{0}")]
+struct UsageError(String);
+
+/// Executes a command and prints what went wrong, once.
+pub fn execute(cli: &Cli) -> ExitCode {
+    let stop = Arc::new(AtomicBool::new(false));
+    let on_signal = Arc::clone(&stop);
+    // A second Ctrl-C ends at once.
+    let handler = ctrlc::set_handler(move || {
+        if on_signal.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    let result = handler.map_err(anyhow::Error::from).and_then(|()| dispatch(&cli.command, &stop));
+    match result {
+        Ok(CommandOutcome::Done) => ExitCode::SUCCESS,
+        Ok(CommandOutcome::CheckFailed) => ExitCode::from(1),
+        Ok(CommandOutcome::LeftOut) => ExitCode::from(3),
+        Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::complain(&error);
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+fn exit_code(error: &anyhow::Error) -> u8 {
+    if error.downcast_ref::<UsageError>().is_some() {
+        return 2;
+    }
+    match error.downcast_ref::<PipelineError>() {
+        Some(PipelineError::Interrupted) => 130,
+        Some(error) if error.is_usage() => 2,
+        _ => 1,
+    }
+}
+
+fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
+    match command {
+        Command::Run(args) => stages::run(&args.stage, args.from, args.to, stop),
+        Command::Tasks(args) => tasks::run(args, stop),
+        Command::Generate(args) => stages::run(args, Stage::Generate, Stage::Generate, stop),
+        Command::Convert(args) => stages::run(args, Stage::Convert, Stage::Convert, stop),
+        Command::Train(args) => stages::run(args, Stage::Train, Stage::Train, stop),
+        Command::Rollout(args) => stages::run(args, Stage::Rollout, Stage::Rollout, stop),
+        Command::Report(args) => stages::report(args, stop),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Validate(args) => validate::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Completions { shell } => completions::run(*shell),
+    }
+}

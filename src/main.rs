@@ -1,3 +1,10 @@
-//! The `ntp` binary.
+//! The `ntp` binary: reads the command line, maps the outcome to an exit code.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use ntp::cli::Cli;
+
+fn main() -> ExitCode {
+    ntp::commands::execute(&Cli::parse())
+}

@@ -1,1 +1,37 @@
 //! A pipeline file, resolved into plans, run stage by stage.
+//!
+//! # Input and output
+//!
+//! [`Pipeline::load`] turns a TOML file (pipelines/*.toml, schemas/pipeline.schema.json) into checked settings before
+//! anything is written. [`run`] composes the stages; no stage calls another. Each stage writes one folder under the
+//! run directory through [`crate::artifact::StageDir`].
+//!
+//! # Invariants
+//!
+//! A stage whose manifest is of the plan that would be made now is skipped. Seeds depend on identity alone, so any
+//! number of jobs gives the same bytes.
+
+mod convert;
+mod error;
+mod generate;
+mod layout;
+mod report;
+mod resolve;
+mod rollout;
+mod runner;
+mod spec;
+mod stage;
+mod tasks;
+mod train;
+mod trials;
+mod verify;
+
+pub use error::PipelineError;
+pub use layout::RunDir;
+pub use resolve::Pipeline;
+pub use runner::{Options, StageReport, Status, run};
+pub use spec::{
+    CountsSpec, GenerateSpec, ModelSpec, PipelineSpec, RecordedFrames, ReportSpec, RolloutSpec, SuiteSpec, TasksSpec,
+};
+pub use stage::Stage;
+pub use verify::{Verification, verify};

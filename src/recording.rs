@@ -1,1 +1,48 @@
-//! Episodes to and from MCAP.
+//! Episodes to and from MCAP: one file a shard, its episodes back to back.
+//!
+//! # Input and output
+//!
+//! [`Episode`](crate::trace::Episode)s, an expert's demonstrations and a policy's rollouts alike, and `.mcap` files
+//! with the protobuf messages of `schemas/mcap`. Where Foxglove has a message type it is used, so that Foxglove and
+//! Rerun show a recording as it is.
+//!
+//! | topic | message | when |
+//! |---|---|---|
+//! | `/ntp/episode/start`, `/ntp/episode/end` | `ntp.v1.EpisodeStart`, `EpisodeEnd` | provenance, scene; outcome, counts |
+//! | `/tf` | `foxglove.FrameTransforms` | each frame: gripper, and bodies that moved; the first frame: all |
+//! | `/ntp/observation` | `ntp.v1.Observation` | each frame: what is not a pose |
+//! | `/ntp/call`, `/ntp/return` | `ntp.v1.ProgramCall`, `ProgramReturn` | each program call and its return |
+//! | `/ntp/stack`, `/ntp/event`, `/scene`, `/log` | `ntp.v1.ProgramStack`, `foxglove.*` | for viewers alone |
+//!
+//! # Units and frames
+//!
+//! Log time is simulated time in nanoseconds from the file's start; episodes are one second apart. Poses are children
+//! of `world`; a body's frame id is its name.
+//!
+//! # Errors
+//!
+//! [`RecordingError`]: each way in which a file can be wrong has its name and its place.
+//!
+//! # Invariants
+//!
+//! What is read equals what was written, poses bit for bit. The same episodes give the same bytes. Reading holds one
+//! chunk and one episode in memory. No clock is read.
+
+mod assembler;
+mod calls;
+mod container;
+mod error;
+mod index;
+mod inspect;
+mod reader;
+mod schema;
+mod start;
+mod stream;
+mod transform;
+mod viewer;
+mod writer;
+
+pub use error::{Damage, EpisodeProblem, MessageProblem, RecordingError};
+pub use inspect::{RecordingInspection, TopicInspection, inspect};
+pub use reader::ShardReader;
+pub use writer::{ShardSummary, ShardWriter};

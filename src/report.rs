@@ -1,1 +1,149 @@
 //! Rollouts and metrics into tables, plots and one page, by Polars.
+//!
+//! # Input and output
+//!
+//! Reads rollouts.parquet and metrics.parquet files (schemas/parquet/); writes `report.json`
+//! (schemas/report.schema.json), `results.csv`, `curves.csv` and `index.html`, which needs no other file.
+//!
+//! # Invariants
+//!
+//! The same inputs give the same bytes: no clock, no host, no thread count and no order of rows shows.
+
+mod chart;
+mod csv;
+mod frames;
+mod interval;
+mod metrics;
+mod order;
+mod page;
+mod paper;
+mod rollouts;
+mod summary;
+
+pub use interval::wilson;
+pub use metrics::MetricsInput;
+pub use paper::{PaperValue, paper_values};
+pub use summary::{Aggregate, Divergence, Fact, InputFile, Report, SuiteResult, TrainingEnd};
+
+use std::path::{Path, PathBuf};
+
+use polars::error::PolarsError;
+
+use crate::artifact::{self, IoError};
+
+/// What a report is made of. Any part may be empty: a report of a run that has only trained is a report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReportInputs {
+    /// What the run is called.
+    pub title: String,
+    /// rollouts.parquet files, in any order.
+    pub rollouts: Vec<PathBuf>,
+    /// metrics.parquet files, in any order.
+    pub metrics: Vec<MetricsInput>,
+    /// What else there is to say of the run, in the order it is to be told.
+    pub facts: Vec<Fact>,
+    /// What to set beside the results; [`paper_values`] as a rule.
+    pub paper: Vec<PaperValue>,
+}
+
+/// A report that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A file could not be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A table could not be read.
+    #[error("cannot read the table: {source}: {}", path.display())]
+    Table {
+        /// Which file, or the first of several.
+        path: PathBuf,
+        /// What Polars says.
+        source: PolarsError,
+    },
+    /// A table is not of its schema.
+    #[error("column {column} {problem}: {}", path.display())]
+    Column {
+        /// Which file.
+        path: PathBuf,
+        /// Which column.
+        column: String,
+        /// What is there instead.
+        problem: String,
+    },
+    /// A rollouts table contradicts itself.
+    #[error("{rows} rows in which {problem}: {}", path.display())]
+    Rows {
+        /// Which file.
+        path: PathBuf,
+        /// How many rows.
+        rows: i64,
+        /// What contradicts what.
+        problem: &'static str,
+    },
+    /// An episode would count twice.
+    #[error("{rows} episodes of variant {variant}, suite {suite}, training seed {seed} occur more than once")]
+    Repeated {
+        /// Of which variant.
+        variant: String,
+        /// In which suite.
+        suite: String,
+        /// Of which training seed.
+        seed: i64,
+        /// How many rows are too many.
+        rows: i64,
+    },
+    /// A query over checked tables failed.
+    #[error("cannot sum up the tables: {0}")]
+    Query(#[source] PolarsError),
+    /// The page could not be filled in.
+    #[error("cannot fill in the page: {0}")]
+    Page(#[from] minijinja::Error),
+}
+
+/// Makes a report in the folder `out`.
+///
+/// # Errors
+///
+/// When an input is missing or not of its schema, an episode occurs twice, or a file cannot be written.
+pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
+    let files = input_files(inputs, out)?;
+    let rollouts = rollouts::read(&inputs.rollouts)?;
+    let curves = metrics::read(&inputs.metrics)?;
+    let report = Report {
+        schema_version: summary::SCHEMA_VERSION,
+        ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
+        title: inputs.title.clone(),
+        aggregates: rollouts::aggregates(&rollouts.results, &inputs.paper),
+        results: rollouts.results,
+        divergences: rollouts.divergences,
+        training: metrics::ends(&curves),
+        paper: inputs.paper.clone(),
+        facts: inputs.facts.clone(),
+        inputs: files,
+    };
+    let page = page::render(&report, &curves)?;
+    artifact::write(&out.join("results.csv"), &csv::results(&report.results)?)?;
+    artifact::write(&out.join("curves.csv"), &csv::curves(&curves)?)?;
+    artifact::write(&out.join("index.html"), page.as_bytes())?;
+    artifact::write_json(&out.join("report.json"), &report)?;
+    Ok(report)
+}
+
+/// The JSON schema of report.json, as in schemas/report.schema.json.
+pub fn json_schema() -> serde_json::Value {
+    schemars::schema_for!(Report).to_value()
+}
+
+/// Every input with its hash. The run directory is where the report's folder lies; paths within it are told from there,
+/// so that a run can be moved without a change of bytes.
+fn input_files(inputs: &ReportInputs, out: &Path) -> Result<Vec<InputFile>, IoError> {
+    let run_dir = out.parent().unwrap_or(out);
+    let paths = inputs.rollouts.iter().chain(inputs.metrics.iter().map(|metrics| &metrics.path));
+    let file = |path: &PathBuf| {
+        let shown = path.strip_prefix(run_dir).unwrap_or(path);
+        Ok(InputFile { path: shown.display().to_string(), sha256: artifact::sha256_file(path)? })
+    };
+    let mut files = paths.map(file).collect::<Result<Vec<_>, IoError>>()?;
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(files)
+}

@@ -9,10 +9,14 @@
 
 mod divergence;
 mod interpreter;
+mod learned;
 mod oracle;
 mod policy;
+mod rows;
 
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use interpreter::{Limits, RolloutEpisode, Start, run};
+pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};
+pub use rows::RolloutRows;

@@ -1,1 +1,221 @@
 //! The tabletop world in rapier3d: bodies, gripper, robot API, recorded frames.
+//!
+//! # Input and output
+//!
+//! A [`Scene`] and where everything starts; frames and the causes of what went wrong. No other module knows the
+//! physics engine.
+//!
+//! # Units and frames
+//!
+//! SI units. World frame: z up, the table's surface at z = 0. The gripper's frame is 2 cm above the centre of what it
+//! holds; its fingers close along its y axis and it turns about the vertical alone.
+//!
+//! # Invariants
+//!
+//! The same scene, start, settings and actions give the same bits, in any thread and for any number of threads. There
+//! is no randomness here and no clock but counted steps. Each action ends with exactly one boundary frame.
+
+mod act;
+mod check;
+mod clock;
+mod config;
+mod drop_spot;
+mod engine_shape;
+mod error;
+mod grasp;
+mod gripper;
+mod motion;
+mod sweep;
+mod watch;
+mod world;
+
+pub use config::SimulationConfig;
+pub use error::SimError;
+
+use crate::geometry::yaw_rad;
+use crate::robot::{Action, RobotApi};
+use crate::scene::{BodyIndex, Scene, SceneState, locked_bodies};
+use crate::trace::{Cause, Frame};
+
+use act::Air;
+use clock::Clock;
+use engine_shape::{IntoEngine as _, from_engine};
+use gripper::Gripper;
+use motion::Tool;
+use watch::{Watch, gravest};
+use world::World;
+
+/// How long to wait for rest before what only jitters is put to sleep, in simulated seconds.
+const PATIENCE_SECS: u32 = 1;
+
+/// A tabletop world with a gripper in it.
+///
+/// A push from outside between two actions belongs here, beside [`RobotApi`]: an impulse on a body of the engine
+/// wakes it, and the engine is stepped until it sleeps again.
+pub struct Simulation {
+    scene: Scene,
+    config: SimulationConfig,
+    world: World,
+    gripper: Gripper,
+    watch: Watch,
+    clock: Clock,
+    frames: Vec<Frame>,
+    /// What was just gripped has left what it stood on when the gripper is this high.
+    lift_off_z: Option<f32>,
+    /// Lost on the way in this action.
+    dropped: Option<BodyIndex>,
+}
+
+impl Simulation {
+    /// Puts everything where it starts, lets it come to rest, and records the first frame.
+    ///
+    /// # Errors
+    ///
+    /// [`SimError`] when a setting is not allowed, when a body has no size or lies off the table, when two bodies (or
+    /// a body and gripper or table) overlap by more than a millimetre, or when something is held already.
+    pub fn new(scene: Scene, initial: &SceneState, config: &SimulationConfig) -> Result<Self, SimError> {
+        config.check()?;
+        let tool = Tool {
+            position: initial.gripper_in_world.translation.vector.into_engine(),
+            yaw_rad: yaw_rad(&initial.gripper_in_world),
+            opening_m: initial.opening_m,
+        };
+        check::check(&scene, initial, &tool)?;
+        let mut world = World::new(&scene, initial, config);
+        let gripper = Gripper::new(&mut world, tool);
+        let clock = Clock::new(config.step_hz, config.frame_hz);
+        let watch = Watch::new(initial);
+        let mut simulation = Self {
+            scene,
+            config: config.clone(),
+            world,
+            gripper,
+            watch,
+            clock,
+            frames: Vec::new(),
+            lift_off_z: None,
+            dropped: None,
+        };
+        simulation.come_to_rest();
+        simulation.clock = clock;
+        simulation.watch = Watch::new(&simulation.state());
+        simulation.record(true);
+        Ok(simulation)
+    }
+
+    /// The bodies that the slots show now.
+    fn locked(&self) -> Vec<BodyIndex> {
+        let before = self.frames.last().map(|frame| frame.slots.as_slice());
+        locked_bodies(&self.scene, &self.state(), before)
+    }
+
+    /// One step: the gripper goes to `tool`, in free flight where nothing else can happen, else in the engine.
+    fn tick(&mut self, tool: Tool, air: Air) {
+        if air == Air::Clear && self.world.is_quiet(self.gripper.held_handle()) {
+            self.gripper.fly(tool);
+        } else {
+            self.step_engine(tool);
+        }
+        if self.clock.tick() {
+            self.record(false);
+        }
+    }
+
+    fn step_engine(&mut self, tool: Tool) {
+        self.gripper.drive(&mut self.world, tool);
+        self.world.step();
+        self.drop_what_slipped();
+    }
+
+    fn drop_what_slipped(&mut self) {
+        if !self.gripper.has_slipped(&self.world) {
+            return;
+        }
+        if let Some(body) = self.gripper.let_go(&mut self.world) {
+            Gripper::part_from(&mut self.world, body);
+            self.dropped = Some(body);
+        }
+    }
+
+    /// Steps the engine, with the gripper where it is, until all is at rest; takes simulated time, records nothing.
+    fn come_to_rest(&mut self) {
+        for step in 0..self.config.settle_limit_steps() {
+            self.step_engine(self.gripper.tool);
+            self.clock.tick();
+            if self.is_at_rest(step) {
+                return;
+            }
+        }
+    }
+
+    /// Whether all but the held body sleeps, after so many steps of waiting for it.
+    fn is_at_rest(&mut self, n_steps: u32) -> bool {
+        let held = self.gripper.held_handle();
+        let is_quiet = self.world.is_quiet(held);
+        if !is_quiet && n_steps >= PATIENCE_SECS * self.config.step_hz {
+            self.world.calm(held);
+        }
+        is_quiet
+    }
+
+    /// Appends a frame. A frame between boundaries that is due at the very end of an action is the boundary.
+    fn record(&mut self, boundary: bool) {
+        let time_nanos = self.clock.time_nanos();
+        let state = self.state();
+        let slots = locked_bodies(&self.scene, &state, self.frames.last().map(|frame| frame.slots.as_slice()));
+        let frame = Frame { time_nanos, boundary, state, slots };
+        match self.frames.last_mut() {
+            Some(last) if last.time_nanos == time_nanos => *last = frame,
+            _ => self.frames.push(frame),
+        }
+    }
+}
+
+impl RobotApi for Simulation {
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn state(&self) -> SceneState {
+        let mut bodies_in_world = self.world.bodies_in_world();
+        if let Some((body, in_world)) = self.gripper.flown() {
+            bodies_in_world[usize::from(body.0)] = from_engine(&in_world);
+        }
+        SceneState {
+            gripper_in_world: from_engine(&self.gripper.tool.in_world()),
+            opening_m: self.gripper.tool.opening_m,
+            held: self.gripper.held.map(|held| held.body),
+            bodies_in_world,
+        }
+    }
+
+    fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// See [`Action`]. To grip while holding and to release with nothing held (it opens the fingers) succeed and move
+    /// nothing; to move to a slot that the scene does not have fails with [`Cause::TimeLimit`].
+    fn act(&mut self, action: Action) -> Result<(), Cause> {
+        let before_nanos = self.clock.time_nanos();
+        let held_before = self.gripper.held.map(|held| held.body);
+        self.dropped = None;
+        let performed = self.perform(action);
+        if self.clock.time_nanos() == before_nanos {
+            self.tick(self.gripper.tool, Air::Clear);
+        }
+        self.record(true);
+        let held_after = self.gripper.held.map(|held| held.body);
+        let handled: Vec<BodyIndex> = held_before.into_iter().chain(held_after).collect();
+        let Self { scene, world, watch, frames, .. } = self;
+        let state = frames.last().map(|frame| &frame.state);
+        let is_moving = |body| !world.body(body).is_sleeping();
+        let broken = state.and_then(|state| watch.judge(scene, state, &handled, is_moving));
+        let dropped = self.dropped.map(|_| Cause::DroppedObject);
+        gravest(broken, gravest(dropped, performed.err())).map_or(Ok(()), Err)
+    }
+
+    fn settle(&mut self) -> SceneState {
+        self.come_to_rest();
+        self.state()
+    }
+}

@@ -1,1 +1,285 @@
 //! From trials in memory to trained weights: examples, batches, learner, checkpoints.
+//!
+//! # Input and output
+//!
+//! [`DatasetTrials`] → a model's folder: `model.safetensors`, `metrics.parquet` and `config.json`. While it is under
+//! way the folder holds `checkpoint/`.
+//!
+//! # Invariants
+//!
+//! The same settings, seed and dataset give the same weights, bit for bit, for any number of threads, in one go or
+//! resumed. Every step draws from a seed of its own.
+//!
+//! # Source
+//!
+//! Paper, section IV, "Model Training".
+
+mod batch;
+mod checkpoint;
+mod config;
+mod curriculum;
+mod examples;
+mod learner;
+mod metrics;
+
+pub use batch::{Part, draw};
+pub use config::{Curriculum, LossWeights, Pairing, TrainConfig};
+pub use examples::{Example, Examples};
+pub use learner::{Learner, Losses, losses};
+pub use metrics::Metric;
+
+use std::path::{Path, PathBuf};
+
+use burn::tensor::Device;
+use sha2::{Digest as _, Sha256};
+
+use crate::artifact::{self, IoError};
+use crate::dataset::DatasetTrials;
+use crate::model::{
+    CONFIG_FILE, Flattened, ModelConfig, ModelError, Network, NetworkConfig, ObjectCentric, WEIGHTS_FILE,
+    weights_to_bytes,
+};
+use crate::seed::Seed;
+use crate::table::TableError;
+use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
+use crate::training::curriculum::LevelErrors;
+
+/// Name of the learning curves in a model's folder.
+pub const METRICS_FILE: &str = "metrics.parquet";
+
+/// A training that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// A setting makes no sense.
+    #[error("train.{key} is {found}; allowed: {allowed}")]
+    Config {
+        /// Its key.
+        key: &'static str,
+        /// As found.
+        found: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The dataset has nothing to learn from.
+    #[error("none of the dataset's {total} successful episodes is of a training task")]
+    NoTrials {
+        /// Successful episodes of any split.
+        total: usize,
+    },
+    /// Trials of different families cannot be learned together.
+    #[error(
+        "the dataset holds more than one family: trial {trial} of task {task} is of {found}, the first of {expected}"
+    )]
+    MixedFamilies {
+        /// The first trial that differs.
+        trial: u32,
+        /// Its task.
+        task: String,
+        /// Its family.
+        found: &'static str,
+        /// The family of the first trial.
+        expected: &'static str,
+    },
+    /// A trial does not fit together.
+    #[error("trial {trial} of task {task}: {problem}")]
+    Trial {
+        /// The task's id.
+        task: String,
+        /// The trial's number.
+        trial: u32,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A checkpoint cannot be used; removing its folder starts afresh.
+    #[error("checkpoint cannot be used: {problem}: {}", path.display())]
+    Checkpoint {
+        /// What is wrong.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The learning curves could not be stored.
+    #[error(transparent)]
+    Metrics(#[from] TableError),
+    /// The weights could not be stored.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// It was asked to stop; a checkpoint holds where it stands.
+    #[error("training was stopped after step {step}")]
+    Stopped {
+        /// Steps done.
+        step: u32,
+    },
+}
+
+/// Where a training stands, for people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Steps done.
+    pub step: u32,
+    /// Steps in all.
+    pub steps: u32,
+    /// Weighed loss of the last step, summed over levels.
+    pub loss: f32,
+}
+
+/// What a training came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainSummary {
+    /// Steps done, those before a resumption included.
+    pub steps: u32,
+    /// Decisions learned from.
+    pub examples: u64,
+    /// The step it was resumed at; 0 when it began afresh.
+    pub resumed_at: u32,
+    /// The learning curves.
+    pub metrics: Vec<Metric>,
+}
+
+/// What a training tells its caller, and asks it.
+pub struct Hooks<'h> {
+    /// Told after each step.
+    pub on_progress: &'h mut dyn FnMut(Progress),
+    /// Asked before each step; when it says yes, a checkpoint is saved and [`TrainError::Stopped`] returned.
+    pub should_stop: &'h dyn Fn() -> bool,
+}
+
+/// Trains a model into a folder, or goes on where a checkpoint in it stands.
+///
+/// # Errors
+///
+/// [`TrainError`]; the folder then holds no `config.json`, at most a checkpoint.
+pub fn train(
+    config: &TrainConfig,
+    data: &DatasetTrials,
+    folder: &Path,
+    hooks: &mut Hooks<'_>,
+) -> Result<TrainSummary, TrainError> {
+    config.check()?;
+    let config = config.resolved();
+    let examples = Examples::new(data)?;
+    let family = family(data)?;
+    let training =
+        serde_json::to_value(&config).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
+    let model = ModelConfig::new(config.variant, family, data.n_slots, training);
+    let device = Device::flex().autodiff();
+    let seed = Seed(config.seed).derive("train", &[]);
+    let run = Run { config: &config, examples: &examples, model: &model, folder, seed };
+    match model.network {
+        NetworkConfig::ObjectCentric(widths) => run.train(ObjectCentric::new(&widths, seed, &device), hooks),
+        NetworkConfig::Flattened(widths) => run.train(Flattened::new(&widths, data.n_slots, seed, &device), hooks),
+    }
+}
+
+/// The one family of a dataset.
+fn family(data: &DatasetTrials) -> Result<crate::task::Family, TrainError> {
+    let first = data.trials.first().ok_or(TrainError::NoTrials { total: 0 })?;
+    match data.trials.iter().find(|trial| trial.family != first.family) {
+        Some(other) => Err(TrainError::MixedFamilies {
+            trial: other.trial,
+            task: other.task_id.clone(),
+            found: other.family.name(),
+            expected: first.family.name(),
+        }),
+        None => Ok(first.family),
+    }
+}
+
+/// Hash of what is learned from: a checkpoint belongs to it.
+fn dataset_hash(data: &DatasetTrials) -> String {
+    let mut hasher = Sha256::new();
+    for trial in &data.trials {
+        hasher.update(trial.task_id.as_bytes());
+        hasher.update(trial.split.name());
+        hasher.update([trial.trial.to_le_bytes(), (trial.n_frames as u32).to_le_bytes()].concat());
+        trial.observations.iter().for_each(|value| hasher.update(value.to_le_bytes()));
+    }
+    artifact::hex(&hasher.finalize())
+}
+
+/// A training with everything settled but its network.
+struct Run<'r> {
+    config: &'r TrainConfig,
+    examples: &'r Examples<'r>,
+    model: &'r ModelConfig,
+    folder: &'r Path,
+    seed: Seed,
+}
+
+impl Run<'_> {
+    fn train<N: Network>(&self, network: N, hooks: &mut Hooks<'_>) -> Result<TrainSummary, TrainError> {
+        let checkpoints = Checkpoints::new(self.folder, self.model, dataset_hash(self.examples.data()));
+        let fresh = Learner::new(network, self.config.loss, self.config.clip_norm);
+        let Resumed { mut learner, mut standing } = checkpoints.resume(fresh)?.unwrap_or_else(|learner| {
+            let errors = LevelErrors::new(self.examples.levels().count());
+            Resumed { learner, standing: Standing { step: 0, examples: 0, errors, metrics: Vec::new() } }
+        });
+        let resumed_at = standing.step;
+        while standing.step < self.config.steps {
+            if (hooks.should_stop)() {
+                checkpoints.save(&learner, &standing)?;
+                return Err(TrainError::Stopped { step: standing.step });
+            }
+            let loss;
+            (learner, loss) = self.step(learner, &mut standing);
+            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.steps, loss });
+            if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.steps {
+                checkpoints.save(&learner, &standing)?;
+            }
+        }
+        self.write(learner.network(), &standing.metrics)?;
+        checkpoints.clear()?;
+        let Standing { step, examples, metrics, errors: _ } = standing;
+        Ok(TrainSummary { steps: step, examples, resumed_at, metrics })
+    }
+
+    /// One step; the learner after it and the weighed loss.
+    fn step<N: Network>(&self, learner: Learner<N>, standing: &mut Standing) -> (Learner<N>, f32) {
+        let step_seed = self.seed.derive("step", &[u64::from(standing.step)]);
+        let learning_rate = self.config.learning_rate_at(standing.step);
+        let chosen = standing.errors.levels(self.config.curriculum, step_seed.derive("levels", &[]));
+        let levels: Vec<_> = self.examples.levels().collect();
+        let sizes: Vec<usize> = chosen.iter().map(|&level| self.batch_size(levels[level].1)).collect();
+        let batches: Vec<Vec<Part>> = (chosen.iter().zip(&sizes).enumerate())
+            .map(|(position, (&level, &size))| {
+                draw(self.examples, self.config, level, size, step_seed.derive("batch", &[position as u64]))
+            })
+            .collect();
+        let lengths: Vec<usize> = batches.iter().map(Vec::len).collect();
+        let parts: Vec<Part> = batches.into_iter().flatten().collect();
+        let (learner, losses) = learner.step(&parts, learning_rate);
+        standing.step += 1;
+        let mut rest = losses.as_slice();
+        let mut total = 0.0;
+        for ((&level, &size), length) in chosen.iter().zip(&sizes).zip(lengths) {
+            let (of_level, after) = rest.split_at(length);
+            rest = after;
+            let losses = of_level.iter().copied().fold(Losses::default(), Losses::plus);
+            total += losses.total;
+            standing.examples += size as u64;
+            standing.errors.update(level, losses.total);
+            if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.steps {
+                let program = levels[level].0;
+                standing.metrics.push(Metric::new(standing.step, program, losses, learning_rate, size as u32));
+            }
+        }
+        (learner, total)
+    }
+
+    fn batch_size(&self, is_root: bool) -> usize {
+        let batch = self.config.batch as usize;
+        if is_root { batch } else { batch.div_ceil(2) }
+    }
+
+    /// The model's files; `config.json` last, since it says that the model is there.
+    fn write<N: Network>(&self, network: &N, metrics: &[Metric]) -> Result<(), TrainError> {
+        let path = self.folder.join(WEIGHTS_FILE);
+        artifact::write(&path, &weights_to_bytes(network, &path)?)?;
+        metrics::write(&self.folder.join(METRICS_FILE), metrics)?;
+        artifact::write_json(&self.folder.join(CONFIG_FILE), self.model)?;
+        Ok(())
+    }
+}

@@ -134,14 +134,6 @@ pub enum ContractError {
         /// Out of how many.
         total: u32,
     },
-    /// The folder holds results of other settings.
-    #[error("{stage} in {} was made by other settings; choose another --out or give --force", path.display())]
-    ForeignPlan {
-        /// The stage.
-        stage: String,
-        /// Its folder.
-        path: PathBuf,
-    },
     /// A file that the manifest names is not as the manifest says.
     #[error("{}: {problem}", path.display())]
     FileDiffers {
@@ -220,14 +212,15 @@ impl StageDir {
         Ok(sha256_file(&self.manifest_path())?)
     }
 
-    /// The receipt of a shard, if it was made by this plan.
+    /// The receipt of a shard, if it was made by this plan and its files are there in their sizes.
     ///
     /// # Errors
     ///
     /// When it is there but not readable.
     pub fn receipt(&self, plan: &Plan, shard: u32) -> Result<Option<Receipt>, IoError> {
         let receipt: Option<Receipt> = read_if_there(&self.receipt_path(shard))?;
-        Ok(receipt.filter(|receipt| receipt.plan_id == plan.id() && receipt.shard == shard))
+        let of_plan = receipt.filter(|receipt| receipt.plan_id == plan.id() && receipt.shard == shard);
+        Ok(of_plan.filter(|receipt| receipt.files.iter().all(|file| self.check_file(file, false).is_ok())))
     }
 
     /// Begins (or goes on with) a plan: what another plan left is removed first.
@@ -238,9 +231,18 @@ impl StageDir {
     pub fn begin(&self, plan: &Plan) -> Result<(), IoError> {
         if self.plan()?.as_ref() != Some(plan) {
             self.clear()?;
-            write_json(&self.plan_path(), plan)?;
+            self.write_plan(plan)?;
         }
         Ok(())
+    }
+
+    /// Writes the plan beside what is there already: for a folder that is made elsewhere and moved here when whole.
+    ///
+    /// # Errors
+    ///
+    /// When the folder cannot be written.
+    pub fn write_plan(&self, plan: &Plan) -> Result<(), IoError> {
+        write_json(&self.plan_path(), plan)
     }
 
     /// Removes everything the stage made.

@@ -1,6 +1,6 @@
 //! A policy that repeats the expert's calls: it tests the interpreter, before any learning.
 
-use crate::rollout::{Decision, Policy, Query};
+use crate::rollout::{Decision, Policy, Query, Start, expected_calls};
 use crate::trace::ProgramCall;
 
 /// Knows for each episode what the expert would call.
@@ -13,6 +13,15 @@ impl Oracle {
     /// For episodes `0..expected.len()`; see [`super::expected_calls`].
     pub fn new(expected: Vec<Vec<ProgramCall>>) -> Self {
         Self { expected }
+    }
+
+    /// For the episodes of [`super::run`] with the same starts.
+    pub fn for_starts(starts: &[Start<'_>]) -> Self {
+        let expected = |start: &Start<'_>| {
+            let demonstration = start.demonstration.clone().boundaries_only();
+            expected_calls(&demonstration, start.world.scene()).into_iter().cloned().collect()
+        };
+        Self::new(starts.iter().map(expected).collect())
     }
 
     fn decide_one(&self, query: &Query) -> Decision {

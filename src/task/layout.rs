@@ -20,6 +20,10 @@ const BLOCK_PITCH_M: f32 = 0.1;
 const BLOCK_JITTER_M: f32 = 0.03;
 /// Least distance between two blocks' centres at the start: fingers must fit between neighbours.
 const BLOCK_SPACING_M: f32 = 0.08;
+/// Positions that are tried for a block before all are scattered anew: its neighbours may leave it no room.
+const MAX_TRIES: usize = 64;
+/// Scatterings that are tried before blocks start in the middles of their cells.
+const MAX_LAYOUTS: usize = 1000;
 
 /// Cells that sorting objects start on, and their pitch.
 const SORTING_CELLS: [usize; 2] = [9, 7];
@@ -33,7 +37,7 @@ const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
 
 /// The most instances of one category.
-pub(crate) const MAX_INSTANCES: u16 = 10;
+pub const MAX_INSTANCES: u16 = 10;
 
 const BLOCK_LETTERS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
 const BLOCK_COLORS: [[u8; 3]; 8] = [
@@ -153,20 +157,32 @@ pub fn initial_state(family: Family, scene: &Scene, seed: Seed) -> SceneState {
 
 fn stacking_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {
     let mut cells: Vec<(usize, usize)> = (0..16).map(|cell| (cell % 4, cell / 4)).collect();
-    cells.shuffle(rng);
+    let scattered = (0..MAX_LAYOUTS).find_map(|_| {
+        cells.shuffle(rng);
+        scatter_blocks(&cells[..scene.bodies.len()], rng)
+    });
+    scattered.unwrap_or_else(|| cells.iter().take(scene.bodies.len()).map(|&cell| cell_middle(cell)).collect())
+}
+
+/// The middle of a cell of the grid that blocks start on.
+fn cell_middle((column, row): (usize, usize)) -> Vec3 {
     let middle = |cell: usize| (cell as f32 - 1.5) * BLOCK_PITCH_M;
+    Vec3::new(middle(column), middle(row), BLOCK_M / 2.0)
+}
+
+/// One block a cell; nothing when the blocks before leave no room in a cell.
+fn scatter_blocks(cells: &[(usize, usize)], rng: &mut impl rand::Rng) -> Option<Vec<Vec3>> {
     let mut positions: Vec<Vec3> = Vec::new();
-    for &(column, row) in cells.iter().take(scene.bodies.len()) {
-        loop {
+    for &cell in cells {
+        let free = (0..MAX_TRIES).find_map(|_| {
             let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
-            let position = Vec3::new(middle(column) + jitter(), middle(row) + jitter(), BLOCK_M / 2.0);
-            if positions.iter().all(|other| horizontal_distance(other, &position) >= BLOCK_SPACING_M) {
-                positions.push(position);
-                break;
-            }
-        }
+            let position = cell_middle(cell) + Vec3::new(jitter(), jitter(), 0.0);
+            let apart = |other: &Vec3| horizontal_distance(other, &position) >= BLOCK_SPACING_M;
+            positions.iter().all(apart).then_some(position)
+        });
+        positions.push(free?);
     }
-    positions
+    Some(positions)
 }
 
 fn sorting_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {

@@ -97,6 +97,10 @@ pub enum TraceError {
     ForeignBody { frame: usize, slot: usize, body: u16 },
     #[error("frame {frame}: a pose is not finite")]
     NotFinite { frame: usize },
+    #[error("frame {frame}: body {body} is held, but the scene has {bodies} bodies")]
+    HeldBody { frame: usize, body: u16, bodies: usize },
+    #[error("slot {slot} may show body {body}, but the scene has {bodies} bodies")]
+    SlotBody { slot: usize, body: u16, bodies: usize },
     #[error("the episode has no calls")]
     NoCalls,
     #[error("call {call}: {problem}")]
@@ -148,6 +152,7 @@ impl Episode {
     /// the root to where it was broken off.
     pub fn new(parts: EpisodeParts) -> Result<Self, TraceError> {
         let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, outcome } = &parts;
+        check_slots(scene)?;
         check_frames(scene, frames)?;
         check_calls(scene.slots.len(), frames.len() as u32, *specification_frames, calls, *outcome)?;
         Ok(Self(parts))
@@ -197,6 +202,16 @@ impl Episode {
     }
 }
 
+fn check_slots(scene: &Scene) -> Result<(), TraceError> {
+    let n_bodies = scene.bodies.len();
+    for (slot, value) in scene.slots.iter().enumerate() {
+        if let Some(body) = value.bodies.iter().find(|body| usize::from(body.0) >= n_bodies) {
+            return Err(TraceError::SlotBody { slot, body: body.0, bodies: n_bodies });
+        }
+    }
+    Ok(())
+}
+
 fn check_frames(scene: &Scene, frames: &[Frame]) -> Result<(), TraceError> {
     let first = frames.first().ok_or(TraceError::NoFrames)?;
     if !first.boundary {
@@ -222,6 +237,9 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
     let pairs = value.slots.iter().zip(&scene.slots).enumerate();
     if let Some((slot, (body, _))) = pairs.into_iter().find(|(_, (body, slot))| !slot.bodies.contains(body)) {
         return Err(TraceError::ForeignBody { frame, slot, body: body.0 });
+    }
+    if let Some(body) = value.state.held.filter(|body| usize::from(body.0) >= n_bodies) {
+        return Err(TraceError::HeldBody { frame, body: body.0, bodies: n_bodies });
     }
     let all_poses = poses.iter().chain([&value.state.gripper_in_world]);
     let mut numbers = all_poses.flat_map(|pose| pose.translation.vector.iter().chain(pose.rotation.coords.iter()));

@@ -1,3 +1,229 @@
-//! Throughput of every stage, one JSON line each.
+//! Throughput of every stage in CPU-seconds (user and system), one JSON line each:
+//! `{"name": …, "value": …, "unit": …}`.
+//!
+//! `cargo bench --bench throughput` measures all; `cargo bench --bench throughput -- NAME …` those named.
 
-fn main() {}
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use cpu_time::ProcessTime;
+use ntp::dataset::{ConvertConfig, DatasetTrials, RecordingEpisodes, convert, read_trials};
+use ntp::expert::demonstrate;
+use ntp::model::Decoder;
+use ntp::recording::{RecordingError, ShardReader, ShardWriter};
+use ntp::rollout::{Limits, Start, load_policy, run};
+use ntp::seed::Seed;
+use ntp::sim::{Simulation, SimulationConfig};
+use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
+use ntp::trace::{Actor, Episode, Provenance};
+use ntp::training::{Hooks, TrainConfig, train};
+
+/// Runs the convert stage alone, in a process of its own, and prints its peak memory.
+const CONVERT_CHILD: &str = "--convert-child";
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    if let [mode, recordings, out] = arguments.as_slice()
+        && mode == CONVERT_CHILD
+    {
+        convert_all(Path::new(recordings), Path::new(out));
+        println!("{}", peak_mb());
+        return;
+    }
+    let wanted = |name: &str| arguments.is_empty() || arguments.iter().any(|argument| argument == name);
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let bench = Bench { folder: folder.path().to_owned() };
+    if wanted("generate_sorting_40") {
+        bench.generate_sorting_40();
+    }
+    let later =
+        ["generate_stacking", "convert_rows", "convert_peak_mb", "train_samples", "policy_step_us", "rollout_stacking"];
+    if later.into_iter().any(wanted) {
+        bench.generate_stacking();
+    }
+    if later[1..].iter().any(|name| wanted(name)) {
+        let trials = bench.convert_rows();
+        bench.convert_peak_mb();
+        bench.train_samples(&trials);
+        bench.policies();
+    }
+}
+
+fn report(name: &str, value: f64, unit: &str) {
+    println!("{}", serde_json::json!({ "name": name, "value": value, "unit": unit }));
+}
+
+/// CPU-seconds of the whole process that `work` takes.
+fn cpu_secs<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = ProcessTime::now();
+    let value = work();
+    (value, start.elapsed().as_secs_f64())
+}
+
+struct Bench {
+    folder: PathBuf,
+}
+
+fn stacking_tasks() -> TaskSet {
+    sample(Family::BlockStacking, 100, 50, Seed(11)).expect("there are so many tasks")
+}
+
+fn trial(task: &Task, index: u32, count: u16) -> Trial {
+    let counts = if task.family == Family::ObjectSorting { vec![count; 4] } else { Vec::new() };
+    Trial { index, counts, seed: Seed(5).derive(&task.id, &[u64::from(index)]) }
+}
+
+fn world(task: &Task, trial: &Trial, frame_hz: u32) -> Simulation {
+    let scene = scene(task.family, &trial.counts);
+    let initial = initial_state(task.family, &scene, trial.seed);
+    let config = SimulationConfig { frame_hz, ..SimulationConfig::default() };
+    Simulation::new(scene, &initial, &config).expect("a drawn start is allowed")
+}
+
+fn demonstration(task: &Task, trial: &Trial, index: u64, frame_hz: u32) -> Episode {
+    let provenance = Provenance::new(task, trial, Actor::Expert, index);
+    demonstrate(task, &mut world(task, trial, frame_hz), provenance).expect("the trace is right")
+}
+
+impl Bench {
+    fn recordings(&self) -> PathBuf {
+        self.folder.join("recordings")
+    }
+
+    /// 400 demonstrations of 100 tasks, all frames, to MCAP.
+    fn generate_stacking(&self) {
+        let tasks = stacking_tasks();
+        let seen: Vec<&Task> = tasks.of_split(Split::Seen).collect();
+        let n_episodes = 400_u64;
+        let (failed, secs) = cpu_secs(|| {
+            let mut failed = 0;
+            for shard in 0..4 {
+                let path = self.recordings().join(format!("shard-{shard:05}.mcap"));
+                let mut writer = ShardWriter::create(&path, "{}").expect("the folder can be written");
+                for index in shard * 100..(shard + 1) * 100 {
+                    let task = seen[(index % 100) as usize];
+                    let episode = demonstration(task, &trial(task, (index / 100) as u32, 1), index, 10);
+                    failed += u64::from(!episode.outcome.is_success());
+                    writer.write(&episode).expect("the recording can be written");
+                }
+                writer.finish().expect("the recording can be written");
+            }
+            failed
+        });
+        report("generate_stacking", n_episodes as f64 / secs, "demonstrations per CPU-second");
+        report("generate_stacking_success", 1.0 - failed as f64 / n_episodes as f64, "share");
+    }
+
+    /// Demonstrations with 40 objects, boundary frames, to MCAP.
+    fn generate_sorting_40(&self) {
+        let tasks = sample(Family::ObjectSorting, 4, 252, Seed(11)).expect("there are so many tasks");
+        let unseen: Vec<&Task> = tasks.of_split(Split::Unseen).collect();
+        let n_episodes = 20_u64;
+        let (failed, secs) = cpu_secs(|| {
+            let path = self.folder.join("sorting.mcap");
+            let mut writer = ShardWriter::create(&path, "{}").expect("the folder can be written");
+            let mut failed = 0;
+            for index in 0..n_episodes {
+                let task = unseen[index as usize * 12];
+                let episode = demonstration(task, &trial(task, 0, 10), index, 0);
+                failed += u64::from(!episode.outcome.is_success());
+                writer.write(&episode).expect("the recording can be written");
+            }
+            writer.finish().expect("the recording can be written");
+            failed
+        });
+        report("generate_sorting_40", n_episodes as f64 / secs, "demonstrations per CPU-second");
+        report("generate_sorting_40_success", 1.0 - failed as f64 / n_episodes as f64, "share");
+    }
+
+    /// Recordings to a dataset, decoding and checking included.
+    fn convert_rows(&self) -> DatasetTrials {
+        let out = self.folder.join("dataset");
+        let (rows, secs) = cpu_secs(|| convert_all(&self.recordings(), &out));
+        report("convert_rows", rows as f64 / secs, "frame and call rows per CPU-second");
+        read_trials(&out).expect("the dataset can be read")
+    }
+
+    fn convert_peak_mb(&self) {
+        let output = Command::new(std::env::current_exe().expect("the bench knows itself"))
+            .args([CONVERT_CHILD.as_ref(), self.recordings().as_os_str(), self.folder.join("child").as_os_str()])
+            .output()
+            .expect("the child can be run");
+        let text = String::from_utf8_lossy(&output.stdout);
+        let peak = text.trim().parse().unwrap_or(f64::NAN);
+        report("convert_peak_mb", peak, "MB");
+    }
+
+    /// Decisions learned from in training, batch building included.
+    fn train_samples(&self, trials: &DatasetTrials) {
+        let config = TrainConfig { steps: 60, checkpoint_every: 1000, ..TrainConfig::default() };
+        let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
+        let (summary, secs) = cpu_secs(|| train(&config, trials, &self.folder.join("model"), &mut hooks));
+        let summary = summary.expect("training goes well");
+        report("train_samples", summary.examples as f64 / secs, "decisions per CPU-second");
+    }
+
+    /// One decision at a time on a 25-frame demonstration, and whole rollouts in physics by the same untrained model.
+    fn policies(&self) {
+        let folder = self.folder.join("model");
+        let tasks = stacking_tasks();
+        let longest = tasks.tasks.iter().find(|task| task.goals.len() == 6);
+        let task = longest.or(tasks.tasks.first()).expect("there are tasks");
+        let (_, mut policy) = load_policy(&folder, Decoder::default()).expect("the model can be read");
+        let demonstration_of = |task: &Task| demonstration(task, &trial(task, 90, 1), 0, 0);
+        let query = first_query(&demonstration_of(task));
+        for _ in 0..200 {
+            policy.decide(std::slice::from_ref(&query));
+        }
+        let n_steps = 2000;
+        let (_, secs) = cpu_secs(|| (0..n_steps).for_each(|_| drop(policy.decide(std::slice::from_ref(&query)))));
+        report("policy_step_us", secs / f64::from(n_steps) * 1e6, "CPU-microseconds");
+        report("policy_step_frames", f64::from(query.window.end), "frames of the specification");
+
+        let unseen: Vec<&Task> = tasks.of_split(Split::Unseen).collect();
+        let (rollouts, secs) = cpu_secs(|| {
+            let starts: Vec<Start<'_>> = unseen.iter().map(|task| start(task, demonstration_of(task))).collect();
+            let mut oracle = ntp::rollout::Oracle::for_starts(&starts);
+            run(&mut oracle, starts, Limits::default()).expect("the trace is right").len()
+        });
+        report("rollout_stacking", rollouts as f64 / secs, "rollouts per CPU-second, demonstrations included, oracle");
+    }
+}
+
+fn first_query(demonstration: &Episode) -> ntp::rollout::Query {
+    let specification = ntp::rollout::Specification::of(demonstration);
+    ntp::rollout::Query {
+        episode: 0,
+        decision: 0,
+        depth: 0,
+        step: 0,
+        window: specification.whole(),
+        specification: std::sync::Arc::new(specification),
+        program: demonstration.provenance.family.root_program(),
+        observation: demonstration.frames[0].observation(),
+    }
+}
+
+fn start(task: &Task, demonstration: Episode) -> Start<'_> {
+    let own = trial(task, 91, 1);
+    let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), 0);
+    Start { task, demonstration, world: Box::new(world(task, &own, 0)), provenance }
+}
+
+fn convert_all(recordings: &Path, out: &Path) -> u64 {
+    let read = |shard: u32| -> Result<_, RecordingError> {
+        let file = format!("shard-{shard:05}.mcap");
+        let episodes = ShardReader::open(&recordings.join(&file))?;
+        Ok(RecordingEpisodes { file, sha256: String::new(), episodes })
+    };
+    let summary = convert((0..4).map(read), &ConvertConfig::default(), out).expect("recordings can be converted");
+    summary.frames + summary.calls
+}
+
+/// Peak resident memory of this process, in MB.
+fn peak_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap_or_default();
+    let kilobytes: f64 = line.split_whitespace().nth(1).and_then(|word| word.parse().ok()).unwrap_or(f64::NAN);
+    kilobytes / 1024.0
+}

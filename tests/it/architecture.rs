@@ -1,1 +1,153 @@
-//! Placeholder.
+//! The layers: what may use what, and that the map is true.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The modules in reading order: each may use those before it and none after it. `rollout` and `trace` use the task's
+/// types; `task` names no later module.
+const ORDER: [&str; 21] = [
+    "geometry",
+    "seed",
+    "scene",
+    "program",
+    "artifact",
+    "table",
+    "progress",
+    "task",
+    "trace",
+    "robot",
+    "sim",
+    "expert",
+    "recording",
+    "dataset",
+    "model",
+    "training",
+    "rollout",
+    "visualize",
+    "report",
+    "pipeline",
+    "cli",
+];
+
+/// Crates that only these modules may use.
+const OWNERS: [(&str, &[&str]); 7] = [
+    ("rapier3d", &["sim"]),
+    ("burn", &["model", "training", "rollout/learned"]),
+    ("mcap", &["recording"]),
+    ("rerun", &["visualize"]),
+    ("polars", &["report"]),
+    ("arrow", &["table", "dataset"]),
+    ("parquet", &["table", "dataset"]),
+];
+
+fn source_files() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    let mut folders: Vec<PathBuf> = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+                files.push((name, std::fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+fn module_of(name: &str) -> &str {
+    name.split('/').next().unwrap().trim_end_matches(".rs")
+}
+
+/// Words behind `crate::` in code, not in comments.
+fn used_modules(text: &str) -> Vec<String> {
+    let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let mut modules = Vec::new();
+    for line in code {
+        for rest in line.split("crate::").skip(1) {
+            let names = match rest.strip_prefix('{') {
+                Some(group) => group.split(',').map(str::trim).collect(),
+                None => vec![rest],
+            };
+            let word =
+                |name: &str| name.chars().take_while(|c| c.is_ascii_lowercase() || *c == '_').collect::<String>();
+            modules.extend(names.into_iter().map(word).filter(|word| !word.is_empty()));
+        }
+    }
+    modules
+}
+
+#[test]
+fn no_module_uses_a_later_one() {
+    let place: BTreeMap<&str, usize> = ORDER.iter().enumerate().map(|(place, module)| (*module, place)).collect();
+    let mut wrong = Vec::new();
+    for (name, text) in source_files() {
+        let Some(own) = place.get(module_of(&name)) else { continue };
+        for used in used_modules(&text) {
+            if place.get(used.as_str()).is_some_and(|used_place| used_place > own) {
+                wrong.push(format!("{name} uses {used}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_module_has_its_place_in_the_order_and_in_the_map() {
+    let map = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md")).unwrap();
+    for (name, _) in source_files() {
+        let module = module_of(&name);
+        let is_edge = ["lib", "main", "commands"].contains(&module);
+        assert!(is_edge || ORDER.contains(&module), "{module} is missing from the order");
+        assert!(module == "lib" || map.contains(&format!("`{module}`")), "{module} is missing from ARCHITECTURE.md");
+    }
+}
+
+#[test]
+fn each_heavy_crate_is_used_in_its_own_module_alone() {
+    let mut wrong = Vec::new();
+    for (name, text) in source_files() {
+        for (owned, owners) in OWNERS {
+            let path = format!("{owned}::");
+            let uses = text.lines().filter(|line| !line.trim_start().starts_with("//")).any(|line| {
+                line.match_indices(&path).any(|(at, _)| {
+                    let before = line[..at].chars().next_back();
+                    !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+                })
+            });
+            let inside = owners
+                .iter()
+                .any(|owner| name.trim_end_matches(".rs") == *owner || name.starts_with(&format!("{owner}/")));
+            if uses && !inside {
+                wrong.push(format!("{name} uses {owned}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_file_begins_by_saying_what_it_is() {
+    for (name, text) in source_files() {
+        assert!(text.starts_with("//! "), "{name} does not begin with a //! line");
+    }
+}
+
+#[test]
+fn no_folder_has_a_mod_rs() {
+    for (name, _) in source_files() {
+        assert!(!name.ends_with("mod.rs"), "{name}");
+    }
+}
+
+#[test]
+fn library_code_reads_no_clock_but_for_progress_and_cpu_time() {
+    for (name, text) in source_files() {
+        let reads = ["Instant::now", "SystemTime::now"].iter().any(|clock| text.contains(clock));
+        assert!(!reads || name.starts_with("progress"), "{name} reads a clock");
+    }
+}

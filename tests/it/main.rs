@@ -16,4 +16,5 @@ mod sim;
 mod table;
 mod task;
 mod trace;
+mod training;
 mod visualize;

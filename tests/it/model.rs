@@ -1,1 +1,341 @@
-//! Placeholder.
+//! Networks, decoders, model folders and the learned policy.
+
+use burn::module::Module as _;
+use burn::nn::Linear;
+use burn::tensor::{Device, Tensor};
+use ntp::model::{
+    CONFIG_FILE, Decoder, Flattened, FlattenedConfig, LabelScores, ModelConfig, ModelError, Network, ObjectCentric,
+    ObjectCentricConfig, ProgramMemory, ScopeHead, Variant, WEIGHTS_FILE, Windows, check_purpose, load, span_score,
+    weights_to_bytes,
+};
+use ntp::program::Program;
+use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
+use ntp::seed::Seed;
+use ntp::task::{Family, Split};
+use ntp::trace::{Observation, Span};
+use proptest::prelude::{ProptestConfig, prop, prop_assert, proptest};
+use rand::Rng as _;
+
+use crate::kinematic::{demonstration, tower, trial};
+
+fn device() -> Device {
+    Device::flex()
+}
+
+fn object_centric(seed: u64) -> ObjectCentric {
+    ObjectCentric::new(&ObjectCentricConfig::default(), Seed(seed), &device())
+}
+
+fn flattened(seed: u64) -> Flattened {
+    Flattened::new(&FlattenedConfig::default(), 8, Seed(seed), &device())
+}
+
+fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().try_into_vec().unwrap()
+}
+
+/// Random observation rows.
+fn rows(n_rows: usize, n_slots: usize, seed: u64) -> Vec<f32> {
+    let mut rng = Seed(seed).rng();
+    let mut row = || {
+        let closed = f32::from(u8::from(rng.random::<bool>()));
+        let mut row: Vec<f32> = (0..3 * n_slots).map(|_| rng.random_range(-0.3..0.3)).collect();
+        row.extend([1.0 - closed, closed]);
+        row
+    };
+    (0..n_rows).flat_map(|_| row()).collect()
+}
+
+/// Everything a network says about one program, window after window.
+struct Said {
+    programs: Vec<f32>,
+    ends: Vec<f32>,
+    scopes: Vec<f32>,
+    arguments: Vec<f32>,
+}
+
+fn say(network: &impl Network, n_slots: usize, windows: &[&[f32]], states: &[f32], program: Program) -> Said {
+    let demonstration = network.demonstration(&Windows::new(n_slots, windows));
+    let reading = network.read(&demonstration, states);
+    let core = network.core(&reading, program);
+    Said {
+        programs: values(core.programs.clone()),
+        ends: values(core.end.clone()),
+        scopes: values(network.scope(&reading, program)),
+        arguments: values(network.argument(&reading, program, &core)),
+    }
+}
+
+#[track_caller]
+fn assert_near(found: &[f32], expected: &[f32]) {
+    assert_eq!(found.len(), expected.len());
+    for (position, (a, b)) in found.iter().zip(expected).enumerate() {
+        assert!((a - b).abs() < 1e-5, "at {position}: {a} is not {b}");
+    }
+}
+
+#[test]
+fn parameter_counts_are_what_they_were() {
+    assert_eq!(object_centric(0).num_params(), 23_950);
+    assert_eq!(flattened(0).num_params(), 251_213);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_parameters() {
+    let bytes = |network: &ObjectCentric| weights_to_bytes(network, "x".as_ref()).unwrap();
+    assert_eq!(bytes(&object_centric(1)), bytes(&object_centric(1)));
+    assert_ne!(bytes(&object_centric(1)), bytes(&object_centric(2)));
+}
+
+/// Keys (1, 0), (0, 2), (-1, 1) and the query (3, 1): scores are 3, 2, -2.
+#[test]
+fn program_memory_scores_by_the_product_of_keys() {
+    let tensor = |rows: [[f32; 2]; 3]| Tensor::<2>::from_data(rows, &device());
+    let memory = ProgramMemory::from_rows(
+        tensor([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+        tensor([[1.0, 0.0], [0.0, 2.0], [-1.0, 1.0]]),
+    );
+    let query = Tensor::<2>::from_data([[3.0_f32, 1.0]], &device());
+    assert_eq!(values(memory.address(query)), [3.0, 2.0, -2.0]);
+    assert_eq!(values(memory.embedding(Program::BlockStacking)), [3.0, 4.0]);
+}
+
+/// One hidden unit: relu(2 * frame + (3 * context - 1)), then labels (1, -1, 0.5, 0) times it plus (0, 0, 0, 0.25).
+/// With context 0.5 the frames 1 and -1 give hidden 2.5 and 0.
+#[test]
+fn the_scoping_head_computes_what_it_says() {
+    let linear = |weight: Tensor<2>, bias: Option<Vec<f32>>| Linear {
+        weight: burn::module::Param::from_tensor(weight),
+        bias: bias.map(|bias| burn::module::Param::from_data(bias.as_slice(), &device())),
+    };
+    let head = ScopeHead::from_layers(
+        linear(Tensor::from_data([[2.0_f32]], &device()), None),
+        linear(Tensor::from_data([[3.0_f32]], &device()), Some(vec![-1.0])),
+        linear(Tensor::from_data([[1.0_f32, -1.0, 0.5, 0.0]], &device()), Some(vec![0.0, 0.0, 0.0, 0.25])),
+    );
+    let frames = Tensor::<3>::from_data([[[1.0_f32], [-1.0]]], &device());
+    let context = Tensor::<2>::from_data([[0.5_f32]], &device());
+    assert_near(&values(head.forward(frames, context)), &[2.5, -2.5, 1.25, 0.25, 0.0, 0.0, 0.0, 0.25]);
+}
+
+fn check_padding(network: &impl Network) {
+    let (short, long) = (rows(3, 8, 1), rows(7, 8, 2));
+    let states = rows(2, 8, 3);
+    let together = say(network, 8, &[&short, &long], &states, Program::Pick);
+    let alone = say(network, 8, &[&short], &states[..26], Program::Pick);
+    assert_near(&together.programs[..Program::ALL.len()], &alone.programs);
+    assert_near(&together.ends[..1], &alone.ends);
+    assert_near(&together.scopes[..3 * 4], &alone.scopes);
+    assert_near(&together.arguments[..8], &alone.arguments);
+}
+
+#[test]
+fn padding_changes_nothing_within_a_window() {
+    check_padding(&object_centric(1));
+    check_padding(&flattened(1));
+}
+
+#[test]
+fn a_cut_demonstration_reads_as_its_part_alone() {
+    let (network, all) = (object_centric(1), rows(9, 8, 4));
+    let state = rows(1, 8, 5);
+    let demonstration = network.demonstration(&Windows::new(8, &[&all]));
+    let window = ObjectCentric::window(&demonstration, Span { begin: 2, end: 6 });
+    let cut = values(network.scope(&network.read(&window, &state), Program::PickAndPlace));
+    let alone = say(&network, 8, &[&all[2 * 26..6 * 26]], &state, Program::PickAndPlace);
+    assert_near(&cut, &alone.scopes);
+}
+
+#[test]
+fn relabelled_slots_relabel_the_argument_of_the_object_centric_network_and_nothing_else() {
+    let network = object_centric(3);
+    let (n_slots, window, state) = (5, rows(4, 5, 6), rows(1, 5, 7));
+    let order = [3, 0, 4, 1, 2];
+    let relabel = |rows: &[f32]| -> Vec<f32> {
+        let row = |row: &[f32]| -> Vec<f32> {
+            let slots = order.iter().flat_map(|&slot| &row[3 * slot..3 * slot + 3]);
+            slots.chain(&row[3 * n_slots..]).copied().collect()
+        };
+        rows.chunks_exact(Observation::width(n_slots)).flat_map(row).collect()
+    };
+    let (before, after) = (
+        say(&network, n_slots, &[&window], &state, Program::Place),
+        say(&network, n_slots, &[&relabel(&window)], &relabel(&state), Program::Place),
+    );
+    assert_near(&after.programs, &before.programs);
+    assert_near(&after.scopes, &before.scopes);
+    assert_near(&after.arguments, &order.map(|slot| before.arguments[slot]));
+}
+
+/// Log-probabilities of frames by their likely labels.
+fn scores(labels: &str) -> Vec<LabelScores> {
+    let score = |likely: char| ['S', 'E', 'I', 'O'].map(|label| if label == likely { -0.1_f32 } else { -4.0 });
+    labels.chars().map(score).collect()
+}
+
+#[track_caller]
+fn check_decoder(decoder: Decoder, labels: &str, begin: u32, end: u32) {
+    assert_eq!(decoder.decode(&scores(labels)), Some(Span { begin, end }), "{} of {labels}", decoder.name());
+}
+
+#[test]
+fn decoders_agree_on_clear_labels() {
+    for decoder in Decoder::ALL {
+        check_decoder(decoder, "OOSIIEOO", 2, 6);
+        check_decoder(decoder, "SE", 0, 2);
+        assert_eq!(decoder.decode(&[]), None);
+    }
+}
+
+#[test]
+fn argmax_never_ends_before_it_starts() {
+    check_decoder(Decoder::Argmax, "EOSIO", 2, 3);
+}
+
+#[test]
+fn sums_bridge_a_doubtful_frame() {
+    check_decoder(Decoder::Mss, "OSIOIEO", 1, 6);
+    check_decoder(Decoder::Am, "OSIOIEO", 1, 6);
+    check_decoder(Decoder::Mss, "OOSIIEOIO", 2, 6);
+}
+
+#[test]
+fn a_window_of_one_frame_is_its_own_part() {
+    for decoder in Decoder::ALL {
+        check_decoder(decoder, "O", 0, 1);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mss_and_am_find_the_likeliest_labellings(frames in prop::collection::vec(prop::array::uniform4(-9.0_f32..0.0), 1..25)) {
+        let n_frames = frames.len() as u32;
+        let highest = |begins: std::ops::Range<u32>| {
+            let spans = begins.flat_map(|begin| (begin + 1..=n_frames).map(move |end| Span { begin, end }));
+            spans.map(|span| span_score(&frames, span)).fold(f32::NEG_INFINITY, f32::max)
+        };
+        let mss = Decoder::Mss.decode(&frames).unwrap();
+        prop_assert!(span_score(&frames, mss) >= highest(0..n_frames) - 1e-4);
+        let am = Decoder::Am.decode(&frames).unwrap();
+        prop_assert!(span_score(&frames, am) >= highest(am.begin..am.begin + 1) - 1e-4);
+        prop_assert!(frames.iter().all(|scores| scores[0] <= frames[am.begin as usize][0]));
+    }
+
+    #[test]
+    fn decoded_spans_lie_in_the_window(logits in prop::collection::vec(prop::array::uniform4(-30.0_f32..0.0), 1..30)) {
+        for decoder in Decoder::ALL {
+            let span = decoder.decode(&logits).unwrap();
+            prop_assert!(span.begin < span.end && span.end as usize <= logits.len());
+        }
+    }
+}
+
+fn store(folder: &std::path::Path, config: &ModelConfig, weights: &[u8]) {
+    ntp::artifact::write_json(&folder.join(CONFIG_FILE), config).unwrap();
+    ntp::artifact::write(&folder.join(WEIGHTS_FILE), weights).unwrap();
+}
+
+fn config(variant: Variant) -> ModelConfig {
+    ModelConfig::new(variant, Family::BlockStacking, 8, serde_json::Value::Null)
+}
+
+#[test]
+fn a_stored_model_decides_as_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = flattened(5);
+    store(folder.path(), &config(Variant::NtpPaper), &weights_to_bytes(&network, folder.path()).unwrap());
+    let (_, mut loaded) = load_policy(folder.path(), Decoder::Mss).unwrap();
+    let queries = queries();
+    assert_eq!(loaded.name(), "ntp_paper");
+    assert_eq!(loaded.decide(&queries), LearnedPolicy::new("ntp_paper", network, Decoder::Mss).decide(&queries));
+}
+
+#[test]
+fn a_model_of_another_kind_is_refused_with_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let weights = weights_to_bytes(&object_centric(0), folder.path()).unwrap();
+    let refused = |config: &ModelConfig, weights: &[u8]| {
+        store(folder.path(), config, weights);
+        let error = load(folder.path()).unwrap_err();
+        assert!(error.to_string().contains(&folder.path().display().to_string()), "{error}");
+        error
+    };
+    let other = ModelConfig { vocabulary: "0011".to_owned(), ..config(Variant::Ntp) };
+    assert!(matches!(refused(&other, &weights), ModelError::Vocabulary { found, .. } if found == "0011"));
+    let other = ModelConfig { version: 9, ..config(Variant::Ntp) };
+    assert!(matches!(refused(&other, &weights), ModelError::Version { found: 9, .. }));
+    let other = ModelConfig { variant: Variant::NtpPaper, ..config(Variant::Ntp) };
+    assert!(matches!(refused(&other, &weights), ModelError::Network { variant: Variant::NtpPaper, .. }));
+    assert!(matches!(refused(&config(Variant::NtpPaper), &weights), ModelError::Weights { .. }));
+    assert!(matches!(refused(&config(Variant::Ntp), &weights[..weights.len() / 2]), ModelError::Weights { .. }));
+    assert!(matches!(refused(&config(Variant::Ntp), b"no tensors"), ModelError::Weights { .. }));
+    let eleven = ModelConfig { n_slots: 11, ..config(Variant::NtpPaper) };
+    let flat = weights_to_bytes(&flattened(0), folder.path()).unwrap();
+    assert!(matches!(refused(&eleven, &flat), ModelError::Weights { .. }));
+    let error = check_purpose(&eleven, &config(Variant::NtpPaper), folder.path()).unwrap_err();
+    assert!(matches!(error, ModelError::Purpose { field: "n_slots", .. }), "{error}");
+}
+
+/// Queries of several programs on two demonstrations.
+fn queries() -> Vec<Query> {
+    let specification = |blocks: &[u16]| {
+        let task = tower("t", blocks, Split::Seen);
+        std::sync::Arc::new(Specification::of(&demonstration(&task, &trial(&task, 0, 1), 0)))
+    };
+    let specifications = [specification(&[0, 1, 2, 3]), specification(&[4, 5])];
+    let programs = [Program::BlockStacking, Program::PickAndPlace, Program::Pick, Program::Place];
+    let query = |(episode, program): (usize, Program)| {
+        let specification = &specifications[episode % 2];
+        let parts = [specification.whole(), Span { begin: 1, end: 4 }, Span { begin: 2, end: 3 }];
+        let window = parts[episode % parts.len()];
+        let row = rows(1, 8, episode as u64);
+        let slots_m = row[..24].chunks_exact(3).map(|position| [position[0], position[1], position[2]]).collect();
+        Query {
+            episode,
+            decision: 0,
+            depth: 0,
+            step: 0,
+            specification: std::sync::Arc::clone(specification),
+            window,
+            program,
+            observation: Observation { slots_m, closed: row[25] > 0.5 },
+        }
+    };
+    (0..24).map(|episode| query((episode, programs[episode % 4]))).collect()
+}
+
+fn check_lawful(query: &Query, decision: &Decision) {
+    assert!(query.window.contains(decision.scope) && !decision.scope.is_empty());
+    assert_eq!(decision.argument.is_some(), decision.program == Program::MoveTo);
+    assert!(decision.program != Program::None || decision.end_of_program);
+    assert!(decision.program.is_composite() || decision.scope == query.window);
+    let prediction = decision.prediction.as_ref().unwrap();
+    let n_frames = if decision.program.is_composite() { query.window.len() } else { 0 };
+    assert_eq!([prediction.start_probabilities.len(), prediction.stop_probabilities.len()], [n_frames; 2]);
+    assert!((0.0..=1.0).contains(&prediction.end_probability));
+}
+
+#[test]
+fn decisions_are_lawful_whatever_the_weights() {
+    let queries = queries();
+    for seed in 0..20 {
+        let mut policy = LearnedPolicy::new("ntp", object_centric(seed), Decoder::Mss);
+        for (query, decision) in queries.iter().zip(policy.decide(&queries)) {
+            check_lawful(query, &decision);
+        }
+    }
+}
+
+#[test]
+fn a_decision_does_not_depend_on_its_company() {
+    let queries = queries();
+    let mut policy = LearnedPolicy::new("ntp", object_centric(4), Decoder::Argmax);
+    let together = policy.decide(&queries);
+    let mut reversed = policy.decide(&queries.iter().rev().cloned().collect::<Vec<_>>());
+    reversed.reverse();
+    let alone: Vec<Decision> = queries.iter().flat_map(|query| policy.decide(std::slice::from_ref(query))).collect();
+    assert_eq!(together, reversed);
+    assert_eq!(together, alone);
+}

@@ -1,1 +1,414 @@
-//! Placeholder.
+//! Reports: from rollouts and metrics tables to results, tables and the page.
+
+#![cfg(test)]
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use ntp::report::{Fact, MetricsInput, ReportInputs, json_schema, make, paper_values};
+use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
+use serde_json::{Value, json};
+
+/// One row of a rollouts table.
+#[derive(Clone)]
+struct Rollout {
+    variant: &'static str,
+    suite: &'static str,
+    seed: i64,
+    episode: i64,
+    /// `None` for a success.
+    cause: Option<&'static str>,
+    /// Decision, kind and program.
+    divergence: Option<(i64, &'static str, &'static str)>,
+}
+
+fn write_parquet(path: &Path, mut table: DataFrame) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    ParquetWriter::new(File::create(path).unwrap()).finish(&mut table).unwrap();
+}
+
+fn rollouts_table(rows: &[Rollout]) -> DataFrame {
+    let text = |of: fn(&Rollout) -> &'static str| rows.iter().map(of).collect::<Vec<_>>();
+    let maybe = |of: fn(&Rollout) -> Option<&'static str>| rows.iter().map(of).collect::<Vec<_>>();
+    df!(
+        "variant" => text(|row| row.variant),
+        "suite" => text(|row| row.suite),
+        "training_seed" => rows.iter().map(|row| row.seed).collect::<Vec<_>>(),
+        "episode" => rows.iter().map(|row| row.episode).collect::<Vec<_>>(),
+        "task_id" => rows.iter().map(|row| format!("stack_{:04}", row.episode)).collect::<Vec<_>>(),
+        "split" => text(|_| "unseen"),
+        "outcome" => text(|row| row.cause.unwrap_or("success")),
+        "success" => rows.iter().map(|row| row.cause.is_none()).collect::<Vec<_>>(),
+        "cause" => maybe(|row| row.cause),
+        "calls" => rows.iter().map(|row| 30 + row.episode % 7).collect::<Vec<_>>(),
+        "decisions" => rows.iter().map(|row| 40 + row.episode % 7).collect::<Vec<_>>(),
+        "first_divergence" => rows.iter().map(|row| row.divergence.map(|(at, ..)| at)).collect::<Vec<_>>(),
+        "divergence_kind" => maybe(|row| row.divergence.map(|(_, kind, _)| kind)),
+        "divergence_program" => maybe(|row| row.divergence.map(|(.., program)| program)),
+        "sim_secs" => rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect::<Vec<_>>(),
+    )
+    .unwrap()
+}
+
+/// Seed 0 of `ntp`: four of five succeed. Seed 1: three of three. `flat`: none of two.
+fn ten_rollouts() -> Vec<Rollout> {
+    let row = |variant, seed, episode, cause, divergence| Rollout {
+        variant,
+        suite: "stacking_unseen",
+        seed,
+        episode,
+        cause,
+        divergence,
+    };
+    vec![
+        row("flat", 0, 0, Some("missed_grasp"), Some((3, "argument", "block_stacking"))),
+        row("ntp", 0, 0, None, None),
+        row("ntp", 0, 1, None, None),
+        row("ntp", 1, 0, None, None),
+        row("ntp", 0, 2, Some("ended_early"), Some((17, "scope", "pick_and_place"))),
+        row("ntp", 0, 3, None, Some((9, "program", "pick"))),
+        row("ntp", 0, 4, None, None),
+        row("flat", 0, 1, Some("never_ended"), Some((0, "program", "block_stacking"))),
+        row("ntp", 1, 1, None, None),
+        row("ntp", 1, 2, None, None),
+    ]
+}
+
+/// Two levels; the loss halves every 100 steps. `end` was not recorded, one loss is not finite.
+fn metrics_table(n_steps: i64) -> DataFrame {
+    let steps: Vec<i64> = (0..n_steps).flat_map(|step| [step, step]).collect();
+    let n = steps.len();
+    let level = |row: usize| if row.is_multiple_of(2) { "pick" } else { "block_stacking" };
+    let loss: Vec<Option<f32>> = steps.iter().map(|&step| Some(0.5_f32.powf(step as f32 / 100.0))).collect();
+    let mut scope = loss.clone();
+    scope.first_mut().into_iter().for_each(|loss| *loss = Some(f32::NAN));
+    df!(
+        "step" => &steps,
+        "level" => (0..n).map(level).collect::<Vec<_>>(),
+        "loss_program" => &loss,
+        "loss_end" => vec![None::<f32>; n],
+        "loss_scope" => scope,
+        "loss_argument" => &loss,
+        "loss_total" => &loss,
+        "learning_rate" => vec![0.002_f32; n],
+        "examples" => vec![32_i64; n],
+    )
+    .unwrap()
+}
+
+/// A run directory with ten rollouts in one file and one training.
+struct Run {
+    folder: tempfile::TempDir,
+    inputs: ReportInputs,
+}
+
+impl Run {
+    fn new(rows: &[Rollout]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let rollouts = folder.path().join("rollouts/all/rollouts.parquet");
+        write_parquet(&rollouts, rollouts_table(rows));
+        let metrics = folder.path().join("models/ntp/metrics.parquet");
+        write_parquet(&metrics, metrics_table(300));
+        let inputs = ReportInputs {
+            title: "Ten <rollouts>".to_owned(),
+            rollouts: vec![rollouts],
+            metrics: vec![MetricsInput { variant: "ntp".to_owned(), seed: 0, path: metrics }],
+            facts: vec![Fact { name: "parameters".to_owned(), value: "25 123".to_owned() }],
+            paper: paper_values(),
+        };
+        Self { folder, inputs }
+    }
+
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("report")
+    }
+
+    fn make(&self) -> ntp::report::Report {
+        make(&self.inputs, &self.out()).unwrap()
+    }
+
+    fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.out().join(name)).unwrap()
+    }
+}
+
+fn rollouts_path(run: &Run) -> &Path {
+    &run.inputs.rollouts[0]
+}
+
+#[test]
+fn ten_rollouts_become_a_results_table() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    insta::assert_snapshot!(run.text("results.csv"), @r#"
+    variant,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs
+    ntp,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000
+    ntp,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000
+    flat,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000
+    "#);
+}
+
+#[test]
+fn a_training_becomes_curves() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    let curves = run.text("curves.csv");
+    let head: Vec<&str> = curves.lines().take(4).collect();
+    insta::assert_snapshot!(head.join("\n"), @"
+    variant,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
+    ntp,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
+    ntp,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
+    ntp,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
+    ");
+    assert_eq!(curves.lines().count(), 1 + 2 * 100, "300 steps are 100 points of 3 steps at each of 2 levels");
+}
+
+#[test]
+fn results_have_the_promised_keys_in_report_json() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    let report: Value = serde_json::from_str(&run.text("report.json")).unwrap();
+    let results = report["results"].as_array().unwrap();
+    let names: Vec<_> =
+        results.iter().map(|row| (row["variant"].as_str().unwrap(), row["seed"].as_i64().unwrap())).collect();
+    assert_eq!(names, [("ntp", 0), ("ntp", 1), ("flat", 0)]);
+    let first = &results[0];
+    assert_eq!(first["suite"], "stacking_unseen");
+    assert_eq!((&first["episodes"], &first["successes"], &first["success_rate"]), (&5.into(), &4.into(), &0.8.into()));
+    let (low, high) = ntp::report::wilson(4, 5);
+    assert_eq!((&first["wilson_low"], &first["wilson_high"]), (&low.into(), &high.into()));
+    assert_eq!(first["causes"], json!({"ended_early": 1}));
+    assert_eq!(results[2]["causes"], json!({"missed_grasp": 1, "never_ended": 1}));
+    assert_eq!(report["inputs"][1]["path"], "rollouts/all/rollouts.parquet");
+    assert_eq!(report["inputs"][1]["sha256"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn seeds_are_averaged_and_the_paper_stands_beside() {
+    let report = Run::new(&ten_rollouts()).make();
+    let [ntp, flat] = report.aggregates.as_slice() else { panic!("{:?}", report.aggregates) };
+    assert_eq!((ntp.seeds, ntp.episodes, ntp.successes), (2, 8, 7));
+    assert!((ntp.mean_success_rate - 0.9).abs() < 1e-12);
+    assert_eq!((ntp.lowest_success_rate, ntp.highest_success_rate), (0.8, 1.0));
+    assert_eq!((ntp.wilson_low, ntp.wilson_high), ntp::report::wilson(7, 8));
+    assert_eq!((ntp.paper_success_rate, flat.paper_success_rate), (Some(0.863), None));
+}
+
+#[test]
+fn the_papers_figures_stand_for_both_encoders_and_all_lengths() {
+    let values = paper_values();
+    let rate = |variant: &str, suite: &str| {
+        values.iter().find(|value| value.is_for(variant, suite)).map(|value| value.success_rate)
+    };
+    assert_eq!(rate("ntp_paper", "stacking_adversary"), Some(0.663));
+    assert_eq!(rate("ntp_gru", "stacking_adversary"), Some(0.422));
+    assert_eq!(rate("ntp", "sorting_unseen_40"), Some(0.9));
+    assert_eq!(rate("flat", "sorting_unseen_40"), Some(0.25));
+    assert_eq!(rate("ntp", "sorting_unseen_mixed"), None);
+    assert_eq!(rate("ntp_no_scope", "stacking_unseen"), None);
+}
+
+#[test]
+fn curves_are_short_and_leave_out_what_is_not_finite() {
+    let run = Run::new(&[]);
+    write_parquet(&run.inputs.metrics[0].path, metrics_table(5000));
+    let report = run.make();
+    let curves = run.text("curves.csv");
+    assert!((200..=241).contains(&curves.lines().count()), "{} lines", curves.lines().count());
+    assert!(!curves.contains("NaN") && !curves.contains("inf"));
+    assert_eq!(report.training.iter().map(|end| end.step).collect::<Vec<_>>(), [4999, 4999]);
+}
+
+#[test]
+fn the_page_needs_nothing_else_and_escapes_what_it_is_given() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    let page = run.text("index.html");
+    for outside in ["http:", "https:", "src=", "<link", "<script", "@import", "url("] {
+        assert!(!page.contains(outside), "the page has {outside}");
+    }
+    assert!(page.contains("Ten &lt;rollouts&gt;") && !page.contains("Ten <rollouts>"));
+    assert!(page.contains("prefers-color-scheme: dark") && page.contains("width=device-width"));
+    for tag in ["section", "div", "svg", "table", "tr", "figure", "details", "ul", "span", "p"] {
+        let count =
+            |start: String| page.matches(&format!("{start} ")).count() + page.matches(&format!("{start}>")).count();
+        assert_eq!(count(format!("<{tag}")), count(format!("</{tag}")), "<{tag}>");
+    }
+}
+
+#[test]
+fn the_page_shows_every_part() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    let page = run.text("index.html");
+    for part in [
+        "Stacking · unseen",
+        "8 rollouts",
+        "paper 86.3 %<b>+3.7 pts</b>",
+        "ended early: 1 of 8 rollouts, 12.5 %",
+        "<code>ntp</code> 1 of 1 failures; 1 recovered",
+        "decision 17: scope, 1 rollouts",
+        "ntp, training seed 0: 0.1267 in the end",
+        "<dt>parameters</dt><dd>25 123</dd>",
+        "rollouts.parquet</code>",
+    ] {
+        assert!(page.contains(part), "the page lacks {part}");
+    }
+}
+
+#[test]
+fn the_same_inputs_in_any_order_give_the_same_bytes() {
+    let mut run = Run::new(&ten_rollouts()[..5]);
+    let second = run.folder.path().join("rollouts/more/rollouts.parquet");
+    write_parquet(&second, rollouts_table(&ten_rollouts()[5..]));
+    run.inputs.rollouts.push(second);
+    let files = || ["report.json", "results.csv", "curves.csv", "index.html"].map(|name| run.text(name));
+    make(&run.inputs, &run.out()).unwrap();
+    let before = files();
+    let mut inputs = run.inputs.clone();
+    inputs.rollouts.reverse();
+    make(&inputs, &run.out()).unwrap();
+    assert_eq!(before, files());
+}
+
+#[test]
+fn rows_in_any_order_give_the_same_results() {
+    let rows = ten_rollouts();
+    let reversed: Vec<Rollout> = rows.iter().rev().cloned().collect();
+    assert_eq!(Run::new(&rows).make().results, Run::new(&reversed).make().results);
+}
+
+/// The ten rollouts by the writer that the rollout stage uses.
+fn write_own_table(path: &Path) {
+    use ntp::table::{Column, TableSchema, write};
+    let rows = ten_rollouts();
+    let text = |of: fn(&Rollout) -> &str| Column::Text(rows.iter().map(|row| of(row).to_owned()).collect());
+    let whole = |of: fn(&Rollout) -> i64| Column::Int64(rows.iter().map(of).collect());
+    let maybe = |of: fn(&Rollout) -> Option<&'static str>| {
+        Column::OptionalText(rows.iter().map(|row| of(row).map(str::to_owned)).collect())
+    };
+    let columns = vec![
+        ("variant", text(|row| row.variant)),
+        ("suite", text(|row| row.suite)),
+        ("training_seed", whole(|row| row.seed)),
+        ("episode", whole(|row| row.episode)),
+        ("task_id", text(|_| "stack_0000")),
+        ("split", text(|_| "unseen")),
+        ("outcome", text(|row| row.cause.unwrap_or("success"))),
+        ("success", Column::Boolean(rows.iter().map(|row| row.cause.is_none()).collect())),
+        ("cause", maybe(|row| row.cause)),
+        ("calls", whole(|row| 30 + row.episode % 7)),
+        ("decisions", whole(|row| 40 + row.episode % 7)),
+        ("first_divergence", Column::OptionalInt64(rows.iter().map(|row| row.divergence.map(|(at, ..)| at)).collect())),
+        ("divergence_kind", maybe(|row| row.divergence.map(|(_, kind, _)| kind))),
+        ("divergence_program", maybe(|row| row.divergence.map(|(.., program)| program))),
+        ("sim_secs", Column::Float64(rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect())),
+    ];
+    write(path, &TableSchema::ROLLOUTS, columns).unwrap();
+}
+
+#[test]
+fn tables_of_our_own_writer_give_the_same_report() {
+    let run = Run::new(&ten_rollouts());
+    let before = run.make();
+    write_own_table(rollouts_path(&run));
+    let after = run.make();
+    assert_eq!(before.results, after.results);
+    assert_eq!(before.divergences, after.divergences);
+}
+
+#[test]
+fn a_report_of_nothing_is_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let report = make(&ReportInputs { title: "Nothing".to_owned(), ..ReportInputs::default() }, &out).unwrap();
+    assert!(report.results.is_empty() && report.training.is_empty());
+    let page = std::fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.contains("No rollouts yet.") && page.contains("No training metrics yet."));
+    let header = std::fs::read_to_string(out.join("results.csv")).unwrap();
+    assert_eq!(header.lines().count(), 1);
+}
+
+#[test]
+fn tables_without_rows_and_rollouts_without_failures_make_a_page() {
+    let run = Run::new(&[]);
+    write_parquet(&run.inputs.metrics[0].path, metrics_table(0));
+    run.make();
+    assert!(run.text("index.html").contains("No rollouts yet."));
+    let successes: Vec<Rollout> = ten_rollouts().into_iter().filter(|row| row.cause.is_none()).collect();
+    let run = Run::new(&successes);
+    run.make();
+    assert!(run.text("index.html").contains("No failures."));
+}
+
+/// Makes a report of a run with one thing changed.
+#[track_caller]
+fn check_error(change: impl FnOnce(&mut Run), expected: &str) {
+    let mut run = Run::new(&ten_rollouts());
+    change(&mut run);
+    let error = make(&run.inputs, &run.out()).unwrap_err().to_string();
+    let error = error.replace(&run.folder.path().display().to_string(), "RUN");
+    assert!(error.contains(expected), "{error}\ndoes not contain\n{expected}");
+    assert!(!run.out().exists(), "something was written in spite of the error");
+}
+
+#[test]
+fn a_table_that_cannot_be_trusted_is_refused_by_name() {
+    let rewrite = |change: fn(DataFrame) -> DataFrame| {
+        move |run: &mut Run| write_parquet(rollouts_path(run), change(rollouts_table(&ten_rollouts())))
+    };
+    check_error(
+        rewrite(|table| table.drop("suite").unwrap()),
+        "column suite is missing; there are variant, training_seed, episode,",
+    );
+    check_error(
+        rewrite(|mut table| {
+            let seeds = table.column("training_seed").unwrap().cast(&DataType::Float64).unwrap();
+            table.with_column(seeds).unwrap();
+            table
+        }),
+        "column training_seed is f64, not i64: RUN/rollouts/all/rollouts.parquet",
+    );
+    check_error(
+        rewrite(|mut table| {
+            table.with_column(Column::new("success".into(), [true; 10])).unwrap();
+            table
+        }),
+        "3 rows in which success is not what the outcome says: RUN/rollouts/all/rollouts.parquet",
+    );
+    check_error(
+        rewrite(|mut table| {
+            table.with_column(Column::new("divergence_kind".into(), ["mood"; 10])).unwrap();
+            table
+        }),
+        "4 rows in which first_divergence has no program, or a kind that is not one of",
+    );
+    check_error(
+        |run| run.inputs.rollouts.push(rollouts_path(run).to_owned()),
+        "2 episodes of variant flat, suite stacking_unseen, training seed 0 occur more than once",
+    );
+    check_error(
+        |run| {
+            let bytes = std::fs::read(rollouts_path(run)).unwrap();
+            std::fs::write(rollouts_path(run), &bytes[..bytes.len() / 2]).unwrap();
+        },
+        "cannot read the table: ",
+    );
+    check_error(
+        |run| std::fs::remove_file(rollouts_path(run)).unwrap(),
+        "failed to open RUN/rollouts/all/rollouts.parquet",
+    );
+    check_error(|run| run.inputs.metrics[0].path = rollouts_path(run).to_owned(), "column step is missing");
+}
+
+#[test]
+fn the_committed_report_schema_is_the_generated_one() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.schema.json");
+    let mut generated = serde_json::to_string_pretty(&json_schema()).unwrap();
+    generated.push('\n');
+    if std::fs::read_to_string(&path).ok().as_ref() != Some(&generated) {
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, &generated).unwrap();
+        panic!("{} was stale and has been written anew: look at the change and commit it", path.display());
+    }
+}

@@ -1,6 +1,6 @@
 //! The interpreter, driven by the oracle.
 
-use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, expected_calls, run};
+use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, run};
 use ntp::scene::SlotIndex;
 use ntp::task::{Split, Task};
 use ntp::trace::{Actor, Cause, Outcome, Provenance};
@@ -17,14 +17,8 @@ fn start(task: &Task, demonstrated: u16, on_table: u16) -> Start<'_> {
     }
 }
 
-fn oracle_for(starts: &[Start<'_>]) -> Oracle {
-    let expected =
-        |start: &Start<'_>| expected_calls(&start.demonstration, start.world.scene()).into_iter().cloned().collect();
-    Oracle::new(starts.iter().map(expected).collect())
-}
-
 fn check_oracle(starts: Vec<Start<'_>>) -> Vec<RolloutEpisode> {
-    let mut oracle = oracle_for(&starts);
+    let mut oracle = Oracle::for_starts(&starts);
     let rollouts = run(&mut oracle, starts, Limits::default()).unwrap();
     for rollout in &rollouts {
         assert_eq!(rollout.episode.outcome, Outcome::Success);
@@ -73,7 +67,7 @@ impl<P: Policy> Policy for Spoiled<P> {
 fn check_spoiled(at: u32, spoil: fn(&Query, &mut Decision)) -> RolloutEpisode {
     let task = tower("t", &[4, 1, 6], Split::Unseen);
     let starts = vec![start(&task, 1, 1)];
-    let mut policy = Spoiled { inner: oracle_for(&starts), at, spoil };
+    let mut policy = Spoiled { inner: Oracle::for_starts(&starts), at, spoil };
     run(&mut policy, starts, Limits::default()).unwrap().remove(0)
 }
 

@@ -1,1 +1,3 @@
-//! Placeholder.
+//! The contracts in `schemas/` against what is written and read.
+
+mod messages;

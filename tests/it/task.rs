@@ -1,5 +1,7 @@
 //! Tasks: sampling, splits, the task file and the import of the authors' file.
 
+#![cfg(test)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -383,4 +385,17 @@ fn a_file_that_is_no_json_is_refused_with_line_and_column() {
     assert!(error.contains("broken.json:2:"), "{error}");
     let missing = import(&folder.path().join("absent.json"), 1).unwrap_err().to_string();
     assert!(missing.contains("absent.json"), "{missing}");
+}
+
+#[test]
+fn every_seed_has_a_start_with_room_for_fingers() {
+    use ntp::geometry::horizontal_distance;
+    let scene = ntp::task::scene(Family::BlockStacking, &[]);
+    for seed in 0..20_000 {
+        let state = ntp::task::initial_state(Family::BlockStacking, &scene, Seed(seed));
+        let positions: Vec<_> = state.bodies_in_world.iter().map(|pose| pose.translation.vector).collect();
+        for (idx, position) in positions.iter().enumerate() {
+            assert!(positions[..idx].iter().all(|other| horizontal_distance(other, position) >= 0.08), "seed {seed}");
+        }
+    }
 }

@@ -1,0 +1,44 @@
+//! The two streams: results on stdout, complaints on stderr.
+
+use std::io::Write as _;
+
+use serde::Serialize;
+
+/// Prints a result.
+///
+/// # Errors
+///
+/// When stdout is closed.
+pub(super) fn print(text: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes())?;
+    if !text.ends_with('\n') {
+        stdout.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+/// Prints a result as indented JSON.
+///
+/// # Errors
+///
+/// When stdout is closed.
+pub(super) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    print(&serde_json::to_string_pretty(value)?)
+}
+
+/// Prints what went wrong. Nothing is left to do when stderr is closed.
+pub(super) fn complain(error: &anyhow::Error) {
+    let _closed = writeln!(std::io::stderr().lock(), "ntp: {error:#}");
+}
+
+/// Prints a note that is no result.
+pub(super) fn note(text: &str) {
+    let _closed = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Whether the reader of stdout went away, which is no failure (`ntp … | head`).
+pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<std::io::Error>();
+    io.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+}

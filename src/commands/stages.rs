@@ -1,0 +1,99 @@
+//! `ntp run`, and the commands of single stages.
+
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::artifact;
+use crate::cli::StageArgs;
+use crate::commands::{CommandOutcome, output};
+use crate::pipeline::{self, Options, Pipeline, RunDir, Stage, StageReport, Status};
+
+/// Runs the stages `from..=to` and prints a line for each unit.
+pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
+    let (_, reports) = run_stages(args, from, to, stop)?;
+    if args.json {
+        output::print_json(&reports)?;
+    } else {
+        reports.iter().try_for_each(|report| output::print(&line(report)))?;
+    }
+    Ok(outcome(&reports))
+}
+
+/// Makes the report and prints it.
+pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
+    let (dir, reports) = run_stages(args, Stage::Report, Stage::Report, stop)?;
+    if args.dry_run {
+        reports.iter().try_for_each(|report| output::print(&line(report)))?;
+        return Ok(CommandOutcome::Done);
+    }
+    let folder = dir.report();
+    if args.json {
+        let text = artifact::read(&folder.path().join("report.json"))?;
+        output::print(&String::from_utf8(text)?)?;
+    } else {
+        let text = artifact::read(&folder.path().join("report.txt"))?;
+        output::print(&String::from_utf8(text)?)?;
+        output::note(&format!("{}", folder.path().join("index.html").display()));
+    }
+    Ok(CommandOutcome::Done)
+}
+
+fn run_stages(
+    args: &StageArgs,
+    from: Stage,
+    to: Stage,
+    stop: &Arc<AtomicBool>,
+) -> anyhow::Result<(RunDir, Vec<StageReport>)> {
+    let pipeline = Pipeline::load(&args.pipeline)?;
+    let dir = RunDir::new(run_directory(args.out.as_deref(), &pipeline));
+    let options = Options {
+        from,
+        to,
+        jobs: args.jobs.map_or_else(all_cores, usize::from),
+        dry_run: args.dry_run,
+        force: args.force,
+        shard: args.shard,
+        progress: true,
+        stop: Arc::clone(stop),
+    };
+    let reports = pipeline::run(&pipeline, &dir, &options)?;
+    Ok((dir, reports))
+}
+
+/// `--out`, or a folder of the pipeline's name.
+pub(super) fn run_directory(out: Option<&Path>, pipeline: &Pipeline) -> PathBuf {
+    out.map_or_else(|| Path::new("data/runs").join(&pipeline.spec.name), Path::to_owned)
+}
+
+fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// One unit in a line.
+pub(super) fn line(report: &StageReport) -> String {
+    let what = match report.status {
+        Status::UpToDate => "up to date".to_owned(),
+        Status::Done => format!("done ({})", report.reason),
+        Status::Needed => format!("to do: {}", report.reason),
+    };
+    let episodes = match (report.episodes, report.failed) {
+        (0, _) => String::new(),
+        (episodes, 0) => format!("  {episodes} episodes"),
+        (episodes, failed) => format!("  {episodes} episodes, {failed} failed"),
+    };
+    let name = if std::io::stdout().is_terminal() { format!("{:<36}", report.unit) } else { report.unit.clone() };
+    format!("{name}  {what}{episodes}")
+}
+
+/// Demonstrations that failed are left out of the dataset; rollouts that failed are a result.
+pub(super) fn outcome(reports: &[StageReport]) -> CommandOutcome {
+    let left_out: u64 =
+        reports.iter().filter(|report| report.stage == Stage::Convert).map(|report| report.failed).sum();
+    if left_out == 0 {
+        return CommandOutcome::Done;
+    }
+    output::note(&format!("{left_out} failed demonstrations were left out of the dataset"));
+    CommandOutcome::LeftOut
+}

@@ -1,0 +1,148 @@
+//! `ntp validate PATH`: every checksum, count and cross-reference; each finding has a code.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::artifact::StageDir;
+use crate::cli::PathArgs;
+use crate::commands::kind::{self, Kind};
+use crate::commands::{CommandOutcome, output, replay};
+use crate::recording::ShardReader;
+use crate::rollout::RolloutRows;
+use crate::task::TaskSet;
+use crate::{dataset, model};
+
+/// Something that is not as it should be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+struct Finding {
+    code: &'static str,
+    path: PathBuf,
+    message: String,
+}
+
+/// What was checked and found.
+#[derive(Debug, Default, Serialize)]
+struct Validation {
+    checked: Vec<String>,
+    findings: Vec<Finding>,
+}
+
+pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
+    let mut validation = Validation::default();
+    match Kind::of(&args.path)? {
+        Kind::Run => {
+            for part in kind::parts_of_run(&args.path)? {
+                check(&part, Kind::of(&part)?, &mut validation)?;
+            }
+        }
+        kind => check(&args.path, kind, &mut validation)?,
+    }
+    if args.json {
+        output::print_json(&validation)?;
+    } else {
+        output::print(&to_text(&validation))?;
+    }
+    Ok(if validation.findings.is_empty() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}
+
+fn to_text(validation: &Validation) -> String {
+    let mut lines: Vec<String> = validation.checked.iter().map(|line| format!("ok      {line}")).collect();
+    let findings = validation.findings.iter();
+    lines.extend(findings.map(|finding| format!("{}  {}: {}", finding.code, finding.path.display(), finding.message)));
+    lines.push(match validation.findings.len() {
+        0 => "nothing wrong".to_owned(),
+        1 => "1 finding".to_owned(),
+        n => format!("{n} findings"),
+    });
+    lines.join("\n")
+}
+
+/// Checks one artifact: the files against its manifest, then what they hold.
+fn check(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result<()> {
+    let before = validation.findings.len();
+    check_manifest(path, kind, validation);
+    let held = match kind {
+        Kind::Recording => check_recording(path).map(|episodes| format!("{episodes} episodes")),
+        Kind::Recordings => check_recordings(path),
+        Kind::Tasks => check_tasks(path),
+        Kind::Dataset => return check_dataset(path, validation),
+        Kind::Model => model::inspect(path).map(|found| format!("{} parameters", found.parameters)).map_err(Into::into),
+        Kind::Rollouts => check_rollouts(path),
+        Kind::Report | Kind::Run => Ok("report".to_owned()),
+    };
+    match held {
+        Ok(held) if validation.findings.len() == before => {
+            validation.checked.push(format!("{}: {}, {held}", path.display(), kind.name()));
+        }
+        Ok(_) => {}
+        Err(error) => {
+            let code = content_code(kind);
+            validation.findings.push(Finding { code, path: path.to_owned(), message: format!("{error:#}") });
+        }
+    }
+    Ok(())
+}
+
+fn content_code(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Recording | Kind::Recordings => "RECORDING",
+        Kind::Tasks => "TASKS",
+        Kind::Dataset => "DATASET",
+        Kind::Model => "MODEL",
+        Kind::Rollouts => "ROLLOUTS",
+        Kind::Report | Kind::Run => "REPORT",
+    }
+}
+
+/// Files against the manifest, by size and hash, where there is one.
+fn check_manifest(path: &Path, kind: Kind, validation: &mut Validation) {
+    let dir = StageDir::new(kind.name(), path);
+    let checked = match dir.manifest() {
+        Ok(None) => Ok(()),
+        Ok(Some(manifest)) => dir.check_files(&manifest, true).map_err(|error| error.to_string()),
+        Err(error) => Err(error.to_string()),
+    };
+    if let Err(message) = checked {
+        validation.findings.push(Finding { code: "MANIFEST", path: path.to_owned(), message });
+    }
+}
+
+fn check_recording(path: &Path) -> anyhow::Result<u64> {
+    let mut episodes = 0;
+    for episode in ShardReader::open(path)? {
+        episode?;
+        episodes += 1;
+    }
+    Ok(episodes)
+}
+
+fn check_recordings(path: &Path) -> anyhow::Result<String> {
+    let files = replay::recordings(path)?;
+    let mut episodes = 0;
+    for file in &files {
+        episodes += check_recording(file)?;
+    }
+    Ok(format!("{} files, {episodes} episodes", files.len()))
+}
+
+fn check_tasks(path: &Path) -> anyhow::Result<String> {
+    let tasks = TaskSet::read(&path.join("tasks.json"))?;
+    tasks.validate()?;
+    Ok(format!("{} tasks, no unseen goal among the seen", tasks.tasks.len()))
+}
+
+fn check_rollouts(path: &Path) -> anyhow::Result<String> {
+    let rows = RolloutRows::read(&path.join("rollouts.parquet"))?;
+    if path.join("recordings").is_dir() {
+        check_recordings(&path.join("recordings"))?;
+    }
+    let (episodes, successes) = rows.successes();
+    Ok(format!("{episodes} episodes, {successes} succeeded"))
+}
+
+fn check_dataset(path: &Path, validation: &mut Validation) -> anyhow::Result<()> {
+    let trials = dataset::read_trials(path)?;
+    validation.checked.push(format!("{}: dataset, {} successful episodes", path.display(), trials.trials.len()));
+    Ok(())
+}

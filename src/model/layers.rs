@@ -1,0 +1,112 @@
+//! Layers that the networks share, initialised from a seed alone.
+//!
+//! # Shapes
+//!
+//! The last dimension of every tensor holds features; `[B, T, ...]` is batch and frame.
+
+use burn::module::{Module, Param, ParamId};
+use burn::nn::Linear;
+use burn::tensor::activation::relu;
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::seed::Seed;
+
+/// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
+/// another process.
+pub(crate) struct Init {
+    rng: ChaCha8Rng,
+    next_id: u64,
+    device: Device,
+}
+
+impl Init {
+    pub(crate) fn new(seed: Seed, device: &Device) -> Self {
+        Self { rng: seed.derive("parameters", &[]).rng(), next_id: 1, device: device.clone() }
+    }
+
+    /// Uniform in `-bound..bound`.
+    pub(crate) fn parameter<const D: usize>(&mut self, shape: [usize; D], bound: f32) -> Param<Tensor<D>> {
+        let values: Vec<f32> = (0..shape.iter().product()).map(|_| self.rng.random_range(-bound..bound)).collect();
+        let mut parameter = Param::from_data(TensorData::new(values, shape), &self.device);
+        parameter.id = ParamId::from(self.next_id);
+        self.next_id += 1;
+        parameter
+    }
+
+    /// A layer whose weights are uniform within one over the root of `n_inputs`.
+    pub(crate) fn linear(&mut self, n_inputs: usize, n_outputs: usize) -> Linear {
+        let bound = (n_inputs as f32).sqrt().recip();
+        let weight = self.parameter([n_inputs, n_outputs], bound);
+        Linear { weight, bias: Some(self.parameter([n_outputs], bound)) }
+    }
+
+    /// A part of a layer that reads a concatenation of `n_concatenated` features, `n_inputs` of them here. The parts'
+    /// outputs are added, which spares the concatenation and lets each part be computed where it is small.
+    pub(crate) fn part(&mut self, n_inputs: usize, n_outputs: usize, n_concatenated: usize) -> Linear {
+        let bound = (n_concatenated as f32).sqrt().recip();
+        Linear { weight: self.parameter([n_inputs, n_outputs], bound), bias: None }
+    }
+
+    pub(crate) fn mlp(&mut self, widths: &[usize]) -> Mlp {
+        Mlp { layers: widths.windows(2).map(|pair| self.linear(pair[0], pair[1])).collect() }
+    }
+
+    pub(crate) fn temporal_conv(&mut self, kernel: usize, n_inputs: usize, n_outputs: usize) -> TemporalConv {
+        TemporalConv { kernel, linear: self.linear(kernel * n_inputs, n_outputs) }
+    }
+}
+
+/// Linear layers, each followed by a rectifier.
+#[derive(Module, Debug)]
+pub(crate) struct Mlp {
+    layers: Vec<Linear>,
+}
+
+impl Mlp {
+    pub(crate) fn forward<const D: usize>(&self, input: Tensor<D>) -> Tensor<D> {
+        self.layers.iter().fold(input, |hidden, layer| relu(layer.forward(hidden)))
+    }
+}
+
+/// A convolution over frames, followed by a rectifier. Beyond the window there are zeros.
+///
+/// # Source
+///
+/// Paper, section IV: a kernel takes the concatenation of k consecutive elements; rectifiers are the nonlinearity.
+#[derive(Module, Debug)]
+pub(crate) struct TemporalConv {
+    kernel: usize,
+    linear: Linear,
+}
+
+impl TemporalConv {
+    /// # Shapes
+    ///
+    /// `[B, T, ..., n_inputs]` → `[B, T, ..., n_outputs]`
+    pub(crate) fn forward<const D: usize>(&self, frames: Tensor<D>) -> Tensor<D> {
+        let n_frames = frames.dims()[1];
+        let mut border = frames.dims();
+        border[1] = self.kernel / 2;
+        let zeros = Tensor::zeros(border, &frames.device());
+        let padded = Tensor::cat(vec![zeros.clone(), frames, zeros], 1);
+        let shifted = (0..self.kernel).map(|offset| padded.clone().narrow(1, offset, n_frames)).collect();
+        relu(self.linear.forward(Tensor::cat(shifted, D - 1)))
+    }
+}
+
+/// One row for each of `n_rows` from one row.
+pub(crate) fn repeat_row(row: Tensor<2>, n_rows: usize) -> Tensor<2> {
+    let width = row.dims()[1];
+    row.expand([n_rows, width])
+}
+
+/// The largest over the frames of rectified (never negative) features; frames beyond the window must be zero.
+///
+/// # Shapes
+///
+/// `[B, T, H]` → `[B, H]`
+pub(crate) fn max_over_frames(frames: Tensor<3>) -> Tensor<2> {
+    frames.max_dim(1).squeeze_dim(1)
+}

@@ -1,0 +1,51 @@
+//! The key-value program memory.
+//!
+//! # Source
+//!
+//! Paper, section IV: `j* = argmax_j (M_key[j] . k)` and `p = M_prog[j*]`. The memory has a row for
+//! [`Program::None`] besides, which the paper has not: a program can end without a last call.
+
+use burn::module::{Module, Param};
+use burn::tensor::Tensor;
+
+use crate::model::layers::Init;
+use crate::program::Program;
+
+/// Embeddings of programs, and the keys they are found by.
+#[derive(Module, Debug)]
+pub struct ProgramMemory {
+    /// `[programs, embedding]`
+    programs: Param<Tensor<2>>,
+    /// `[programs, key]`
+    keys: Param<Tensor<2>>,
+}
+
+impl ProgramMemory {
+    pub(crate) fn new(init: &mut Init, width: usize) -> Self {
+        let n_programs = Program::ALL.len();
+        Self { programs: init.parameter([n_programs, width], 0.5), keys: init.parameter([n_programs, width], 0.5) }
+    }
+
+    /// A memory of given rows.
+    pub fn from_rows(programs: Tensor<2>, keys: Tensor<2>) -> Self {
+        Self { programs: Param::from_tensor(programs), keys: Param::from_tensor(keys) }
+    }
+
+    /// The embedding of a program.
+    ///
+    /// # Shapes
+    ///
+    /// `[1, embedding]`
+    pub fn embedding(&self, program: Program) -> Tensor<2> {
+        self.programs.val().narrow(0, program.index(), 1)
+    }
+
+    /// How well each row's key fits: the logits of the next program.
+    ///
+    /// # Shapes
+    ///
+    /// `[B, key]` → `[B, programs]`
+    pub fn address(&self, key: Tensor<2>) -> Tensor<2> {
+        key.matmul(self.keys.val().transpose())
+    }
+}

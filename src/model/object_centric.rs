@@ -1,0 +1,227 @@
+//! The object-centric network: every slot of every demonstrated frame is compared with the same slot now.
+//!
+//! ```text
+//! for each pair (i, k) of slots: displacement in the frame, displacement now ─► max over k ─► e_ji
+//! for each slot i: e_ji, position in the frame, position now, gripper      ─► u_ji ─► max over i ─► v_j
+//! temporal convolution over v_j ─► y_j ─► scoping labels;  max and last of them ─► core
+//! temporal convolution over u_ji for each slot ─► pointer argument
+//! ```
+//!
+//! # Invariants
+//!
+//! Slots enter through shared layers and maxima alone: relabelling them relabels the argument and changes nothing
+//! else, and any number of slots will do.
+//!
+//! # Source
+//!
+//! Ours, beyond the paper, whose encoder is [`super::flattened`]; interpreter, core and memory are the paper's.
+
+use burn::module::Module;
+use burn::nn::Linear;
+use burn::tensor::activation::relu;
+use burn::tensor::{Device, Tensor, TensorData};
+use serde::{Deserialize, Serialize};
+
+use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
+use crate::model::heads::{CoreOutput, ReactiveCore, ScopeHead};
+use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, repeat_row};
+use crate::model::memory::ProgramMemory;
+use crate::model::network::{Network, Padding, Windows};
+use crate::program::Program;
+use crate::seed::Seed;
+use crate::trace::Span;
+
+/// Widths of the object-centric network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectCentricConfig {
+    /// Features of a pair of slots. Default 12.
+    pub pair_width: usize,
+    /// Features of a slot, of a frame, of the state, and of every hidden layer. Default 32.
+    pub width: usize,
+    /// Width of program embeddings and keys. Default 16.
+    pub program_width: usize,
+    /// Frames that a scoping label sees around itself; odd. Default 5.
+    pub scope_kernel: usize,
+    /// Frames that an argument sees around itself; odd. Default 3.
+    pub argument_kernel: usize,
+}
+
+impl Default for ObjectCentricConfig {
+    fn default() -> Self {
+        Self { pair_width: 12, width: 32, program_width: 16, scope_kernel: 5, argument_kernel: 3 }
+    }
+}
+
+/// The network of variant `ntp`.
+#[derive(Module, Debug)]
+pub struct ObjectCentric {
+    pair_demonstration: Linear,
+    pair_state: Linear,
+    pair: Linear,
+    object_pairs: Linear,
+    object_demonstration: Linear,
+    object_state: Linear,
+    object: Linear,
+    state: Mlp,
+    scope_conv: TemporalConv,
+    scope: ScopeHead,
+    core: ReactiveCore,
+    memory: ProgramMemory,
+    pointer_conv: TemporalConv,
+    pointer_object: Linear,
+    pointer_context: Linear,
+    pointer: Linear,
+}
+
+/// First layers of pairs and slots, for the demonstration alone.
+#[derive(Clone, Debug)]
+pub struct ObjectDemonstration {
+    /// `[B, T, N * N, pair]`
+    pairs: Tensor<4>,
+    /// `[B, T, N, H]`
+    objects: Tensor<4>,
+    padding: Option<Padding>,
+}
+
+/// Demonstration and state, compared.
+#[derive(Clone, Debug)]
+pub struct ObjectReading {
+    /// Each slot in each frame, `[B, T, N, H]`.
+    objects: Tensor<4>,
+    /// Each frame with its neighbours, `[B, T, H]`; zero beyond a window.
+    frames: Tensor<3>,
+    /// Most and last of the window, `[B, 2 H]`.
+    context: Tensor<2>,
+    /// The state with the gripper, `[B, H + AGENT_WIDTH]`.
+    state: Tensor<2>,
+    padding: Option<Padding>,
+}
+
+impl ObjectCentric {
+    /// A fresh network; the same seed gives the same parameters.
+    pub fn new(config: &ObjectCentricConfig, seed: Seed, device: &Device) -> Self {
+        let &ObjectCentricConfig { pair_width, width, program_width, scope_kernel, argument_kernel } = config;
+        let init = &mut Init::new(seed, device);
+        let n_pair = 2 * POSITION_WIDTH;
+        let n_object = pair_width + 2 * OBJECT_WIDTH;
+        let n_state = width + AGENT_WIDTH;
+        let n_context = n_state + program_width;
+        let n_pointer = 2 * width + program_width + width;
+        Self {
+            pair_demonstration: init.part(POSITION_WIDTH, pair_width, n_pair),
+            pair_state: init.linear(POSITION_WIDTH, pair_width),
+            pair: init.linear(pair_width, pair_width),
+            object_pairs: init.part(pair_width, width, n_object),
+            object_demonstration: init.part(OBJECT_WIDTH, width, n_object),
+            object_state: init.linear(OBJECT_WIDTH, width),
+            object: init.linear(width, width),
+            state: init.mlp(&[OBJECT_WIDTH, width, width]),
+            scope_conv: init.temporal_conv(scope_kernel, width, width),
+            scope: ScopeHead::new(init, 2 * width, n_context, width),
+            core: ReactiveCore::new(init, &[2 * width + n_context, width], program_width),
+            memory: ProgramMemory::new(init, program_width),
+            pointer_conv: init.temporal_conv(argument_kernel, width, width),
+            pointer_object: init.part(2 * width, width, n_pointer),
+            pointer_context: init.linear(program_width + width, width),
+            pointer: init.linear(width, 1),
+        }
+    }
+
+    /// Program and state side by side, `[B, program + state]`.
+    fn program_and_state(&self, reading: &ObjectReading, program: Program) -> Tensor<2> {
+        let state = reading.state.clone();
+        let program = repeat_row(self.memory.embedding(program), state.dims()[0]);
+        Tensor::cat(vec![program, state], 1)
+    }
+
+    /// Each slot in each frame, compared with its pairs and itself now: `[B, T, N, H]`.
+    fn compare(&self, demonstration: &ObjectDemonstration, states: Rows<'_>) -> Tensor<4> {
+        let device = self.device();
+        let ObjectDemonstration { pairs, objects, padding: _ } = demonstration;
+        let [n_batch, n_frames, n_slots, _] = objects.dims();
+        let now = [n_batch, 1, n_slots * n_slots, POSITION_WIDTH];
+        let pairs_now = self.pair_state.forward(Tensor::<4>::from_data(TensorData::new(states.pairs(), now), &device));
+        let compared = self.pair.forward(relu(pairs.clone() + pairs_now)); // [B, T, N * N, pair]
+        let n_pair = compared.dims()[3];
+        let relations = compared.reshape([n_batch * n_frames, n_slots, n_slots, n_pair]).max_dim(2); // [B * T, N, 1, pair]
+        let relations = relations.reshape([n_batch, n_frames, n_slots, n_pair]);
+        let now = [n_batch, 1, n_slots, OBJECT_WIDTH];
+        let objects_now = Tensor::<4>::from_data(TensorData::new(states.objects(), now), &device);
+        let hidden = self.object_pairs.forward(relations) + objects.clone() + self.object_state.forward(objects_now);
+        relu(self.object.forward(relu(hidden)))
+    }
+}
+
+impl Network for ObjectCentric {
+    type Demonstration = ObjectDemonstration;
+    type Reading = ObjectReading;
+
+    fn demonstration(&self, windows: &Windows) -> ObjectDemonstration {
+        let device = self.device();
+        let (n_batch, n_frames, n_slots) = (windows.n_windows(), windows.n_frames(), windows.n_slots());
+        let pairs = TensorData::new(windows.rows().pairs(), [n_batch, n_frames, n_slots * n_slots, POSITION_WIDTH]);
+        let objects = TensorData::new(windows.rows().objects(), [n_batch, n_frames, n_slots, OBJECT_WIDTH]);
+        ObjectDemonstration {
+            pairs: self.pair_demonstration.forward(Tensor::from_data(pairs, &device)),
+            objects: self.object_demonstration.forward(Tensor::from_data(objects, &device)),
+            padding: windows.padding(&device),
+        }
+    }
+
+    fn window(demonstration: &ObjectDemonstration, span: Span) -> ObjectDemonstration {
+        let cut = |frames: &Tensor<4>| frames.clone().narrow(1, span.begin as usize, span.len());
+        ObjectDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
+    }
+
+    fn read(&self, demonstration: &ObjectDemonstration, states: &[f32]) -> ObjectReading {
+        let padding = demonstration.padding.as_ref();
+        let [n_batch, _, n_slots, _] = demonstration.objects.dims();
+        let states = Rows { n_slots, values: states };
+        let objects = self.compare(demonstration, states);
+        let frames = Padding::mask(padding, objects.clone().max_dim(2).squeeze_dim(2)); // [B, T, H]
+        let last = Padding::last_frame(padding, frames.clone());
+        let frames = Padding::mask(padding, self.scope_conv.forward(frames));
+        let most = max_over_frames(frames.clone());
+        let device = self.device();
+        let now = TensorData::new(states.objects(), [n_batch, n_slots, OBJECT_WIDTH]);
+        let agents = TensorData::new(states.agents(), [n_batch, AGENT_WIDTH]);
+        let state = self.state.forward(Tensor::<3>::from_data(now, &device)).max_dim(1).squeeze_dim(1);
+        ObjectReading {
+            objects,
+            frames,
+            context: Tensor::cat(vec![most, last], 1),
+            state: Tensor::cat(vec![state, Tensor::from_data(agents, &device)], 1),
+            padding: demonstration.padding.clone(),
+        }
+    }
+
+    fn core(&self, reading: &ObjectReading, program: Program) -> CoreOutput {
+        let input = Tensor::cat(vec![reading.context.clone(), self.program_and_state(reading, program)], 1);
+        self.core.forward(input, &self.memory)
+    }
+
+    fn scope(&self, reading: &ObjectReading, program: Program) -> Tensor<3> {
+        let frames = reading.frames.clone();
+        let [n_batch, n_frames, width] = frames.dims();
+        // What came before a frame tells whether a segment that is still to do lies before it.
+        let first = Tensor::zeros([n_batch, 1, width], &frames.device());
+        let before = Tensor::cat(vec![first, frames.clone()], 1).narrow(1, 0, n_frames).cummax(1);
+        self.scope.forward(Tensor::cat(vec![frames, before], 2), self.program_and_state(reading, program))
+    }
+
+    fn argument(&self, reading: &ObjectReading, program: Program, core: &CoreOutput) -> Tensor<2> {
+        let padding = reading.padding.as_ref();
+        let objects = Padding::mask_objects(padding, reading.objects.clone());
+        let last = Padding::last_objects(padding, objects.clone());
+        let moving = Padding::mask_objects(padding, self.pointer_conv.forward(objects)).max_dim(1).squeeze_dim(1);
+        let program = repeat_row(self.memory.embedding(program), core.hidden.dims()[0]);
+        let context = self.pointer_context.forward(Tensor::cat(vec![program, core.hidden.clone()], 1));
+        let object = self.pointer_object.forward(Tensor::<3>::cat(vec![moving, last], 2));
+        self.pointer.forward(relu(object + context.unsqueeze_dim(1))).squeeze_dim(2)
+    }
+
+    fn device(&self) -> Device {
+        self.pair.weight.device()
+    }
+}

@@ -1,0 +1,193 @@
+//! A model's folder: `config.json` and `model.safetensors`.
+//!
+//! # Errors
+//!
+//! A folder that does not fit (another vocabulary, another number of slots, weights of other shapes) is refused with
+//! its path; nothing is loaded in part.
+
+use std::path::{Path, PathBuf};
+
+use burn::module::Module;
+use burn::store::{ModuleSnapshot as _, SafetensorsStore};
+use burn::tensor::Device;
+use serde::Serialize;
+
+use crate::artifact::{self, IoError};
+use crate::model::config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
+use crate::model::flattened::Flattened;
+use crate::model::object_centric::ObjectCentric;
+use crate::program::vocabulary_hash;
+use crate::seed::Seed;
+
+/// Name of the resolved configuration in a model's folder.
+pub const CONFIG_FILE: &str = "config.json";
+/// Name of the weights in a model's folder.
+pub const WEIGHTS_FILE: &str = "model.safetensors";
+
+/// A model that cannot be stored or used.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// A file could not be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// `config.json` is of a version that is not known.
+    #[error("model configuration has version {found}, this program reads {}: {}", ModelConfig::VERSION, path.display())]
+    Version {
+        /// As found.
+        found: u32,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The model knows other programs.
+    #[error("model was trained for the program vocabulary {found}, this program has {expected}: {}", path.display())]
+    Vocabulary {
+        /// Hash in the file.
+        found: String,
+        /// Hash of this program's.
+        expected: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Variant and widths do not belong together.
+    #[error("model configuration has widths that are not those of variant {variant}: {}", path.display())]
+    Network {
+        /// As found.
+        variant: Variant,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The model is for other scenes.
+    #[error("model is for {field} {found}, but {expected} is asked for: {}", path.display())]
+    Purpose {
+        /// `variant`, `family` or `n_slots`.
+        field: &'static str,
+        /// As found.
+        found: String,
+        /// As asked for.
+        expected: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The weights are not those of the configuration.
+    #[error("model weights do not fit their configuration: {problem}: {}", path.display())]
+    Weights {
+        /// Which tensor, what was expected and found.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// The weights as a safetensors file: names in order, no metadata, so the same weights are the same bytes.
+///
+/// # Errors
+///
+/// [`ModelError::Weights`] when they cannot be written in that format; `path` is for the message alone.
+pub fn weights_to_bytes(network: &impl Module, path: &Path) -> Result<Vec<u8>, ModelError> {
+    let problem = |error: &dyn std::fmt::Display| ModelError::Weights { problem: error.to_string(), path: path.into() };
+    let mut store = SafetensorsStore::from_bytes(None).clear_metadata();
+    network.save_into(&mut store).map_err(|error| problem(&error))?;
+    store.get_bytes().map_err(|error| problem(&error))
+}
+
+/// Replaces the weights of a network.
+///
+/// # Errors
+///
+/// [`ModelError::Weights`] when the bytes are not exactly this network's; `path` is for the message alone.
+pub fn weights_from_bytes<M: Module>(mut network: M, bytes: Vec<u8>, path: &Path) -> Result<M, ModelError> {
+    let problem = |problem: String| ModelError::Weights { problem, path: path.into() };
+    let mut store = SafetensorsStore::from_bytes(Some(bytes));
+    let applied = network.load_from(&mut store).map_err(|error| problem(error.to_string()))?;
+    match applied.unused.first() {
+        Some(name) => Err(problem(format!("tensor {name:?} is not one of the network's"))),
+        None => Ok(network),
+    }
+}
+
+/// Reads and checks `config.json`.
+///
+/// # Errors
+///
+/// When it is not there, not readable, or of another version or vocabulary.
+pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
+    let path = folder.join(CONFIG_FILE);
+    let config: ModelConfig = artifact::read_json(&path)?;
+    if config.version != ModelConfig::VERSION {
+        return Err(ModelError::Version { found: config.version, path });
+    }
+    let expected = vocabulary_hash();
+    if config.vocabulary != expected {
+        return Err(ModelError::Vocabulary { found: config.vocabulary, expected, path });
+    }
+    match (config.variant, config.network) {
+        (Variant::Ntp, NetworkConfig::ObjectCentric(_)) | (Variant::NtpPaper, NetworkConfig::Flattened(_)) => {}
+        (variant, _) => return Err(ModelError::Network { variant, path }),
+    }
+    Ok(config)
+}
+
+/// Refuses a model that was made for something else than what is asked for.
+///
+/// # Errors
+///
+/// [`ModelError::Purpose`] for the first field that differs.
+pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) -> Result<(), ModelError> {
+    let fields = [
+        ("variant", config.variant.to_string(), wanted.variant.to_string()),
+        ("family", config.family.name().to_owned(), wanted.family.name().to_owned()),
+        ("n_slots", config.n_slots.to_string(), wanted.n_slots.to_string()),
+    ];
+    match fields.into_iter().find(|(_, found, expected)| found != expected) {
+        Some((field, found, expected)) => {
+            Err(ModelError::Purpose { field, found, expected, path: folder.join(CONFIG_FILE) })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Loads a trained model for inference.
+///
+/// # Errors
+///
+/// As [`load_config`], and when the weights do not fit.
+pub fn load(folder: &Path) -> Result<(ModelConfig, AnyNetwork), ModelError> {
+    let config = load_config(folder)?;
+    let path = folder.join(WEIGHTS_FILE);
+    let bytes = artifact::read(&path)?;
+    let device = Device::flex();
+    let network = match config.network {
+        NetworkConfig::ObjectCentric(widths) => {
+            let network = ObjectCentric::new(&widths, Seed(0), &device);
+            AnyNetwork::ObjectCentric(Box::new(weights_from_bytes(network, bytes, &path)?))
+        }
+        NetworkConfig::Flattened(widths) => {
+            let network = Flattened::new(&widths, config.n_slots, Seed(0), &device);
+            AnyNetwork::Flattened(Box::new(weights_from_bytes(network, bytes, &path)?))
+        }
+    };
+    Ok((config, network))
+}
+
+/// What `ntp inspect` says of a model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelSummary {
+    /// How many numbers were learned.
+    pub parameters: usize,
+    /// Its `config.json`.
+    pub config: ModelConfig,
+}
+
+/// Reads a model and counts its parameters.
+///
+/// # Errors
+///
+/// As [`load`].
+pub fn inspect(folder: &Path) -> Result<ModelSummary, ModelError> {
+    let (config, network) = load(folder)?;
+    let parameters = match network {
+        AnyNetwork::ObjectCentric(network) => network.num_params(),
+        AnyNetwork::Flattened(network) => network.num_params(),
+    };
+    Ok(ModelSummary { parameters, config })
+}

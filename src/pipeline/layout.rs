@@ -1,0 +1,67 @@
+//! Where everything lies under a run directory.
+
+use std::path::{Path, PathBuf};
+
+use crate::artifact::StageDir;
+use crate::model::Variant;
+use crate::pipeline::Stage;
+
+/// A run directory.
+#[derive(Clone, Debug)]
+pub struct RunDir {
+    root: PathBuf,
+}
+
+impl RunDir {
+    /// The run directory at `root`; nothing is read or written.
+    pub fn new(root: impl Into<PathBuf>) -> Self {
+        Self { root: root.into() }
+    }
+
+    /// Where it is.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    fn stage(&self, stage: Stage, folder: &str) -> StageDir {
+        StageDir::new(stage.name(), self.root.join(folder))
+    }
+
+    /// `tasks/tasks.json`.
+    pub fn tasks(&self) -> StageDir {
+        self.stage(Stage::Tasks, "tasks")
+    }
+
+    /// `recordings/*.mcap`.
+    pub fn recordings(&self) -> StageDir {
+        self.stage(Stage::Generate, "recordings")
+    }
+
+    /// `dataset/`: a LeRobotDataset with plan and manifest.
+    pub fn dataset(&self) -> StageDir {
+        self.stage(Stage::Convert, "dataset")
+    }
+
+    /// `models/<variant>-seed<k>/`.
+    pub fn model(&self, name: &str) -> StageDir {
+        self.stage(Stage::Train, &format!("models/{name}"))
+    }
+
+    /// `rollouts/<model>/<suite>/`.
+    pub fn rollouts(&self, model: &str, suite: &str) -> StageDir {
+        self.stage(Stage::Rollout, &format!("rollouts/{model}/{suite}"))
+    }
+
+    /// `report/`.
+    pub fn report(&self) -> StageDir {
+        self.stage(Stage::Report, "report")
+    }
+}
+
+/// The folder name of a trained model.
+pub(super) fn model_name(variant: Variant, train_tasks: Option<u32>, seed: u64) -> String {
+    match train_tasks {
+        Some(tasks) => format!("{}-tasks{tasks}-seed{seed}", variant.name()),
+        None => format!("{}-seed{seed}", variant.name()),
+    }
+}

@@ -1,0 +1,194 @@
+//! From a pipeline file to checked settings: nothing is written before everything is known to fit.
+
+use std::path::{Path, PathBuf};
+
+use crate::artifact;
+use crate::pipeline::trials::DEFAULT_COUNTS;
+use crate::pipeline::{CountsSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::task::{Family, MAX_INSTANCES, Split};
+use crate::training::TrainConfig;
+
+/// A checked pipeline.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    /// The file it was read from.
+    pub path: PathBuf,
+    /// Its settings.
+    pub spec: PipelineSpec,
+}
+
+/// Tasks that a family has in all, where that is few enough to matter.
+const SORTING_TRAIN_TASKS: u32 = 4;
+const SORTING_UNSEEN_TASKS: u32 = 252;
+
+impl Pipeline {
+    /// Reads and checks a pipeline file.
+    ///
+    /// # Errors
+    ///
+    /// [`PipelineError::Syntax`] or [`PipelineError::Value`], which name file, key and what is allowed; an I/O error
+    /// when the file is not there.
+    pub fn load(path: &Path) -> Result<Self, PipelineError> {
+        let syntax = |message: String| PipelineError::Syntax { path: path.to_owned(), message };
+        let bytes = std::fs::read(path).map_err(|error| syntax(format!("cannot be read: {error}")))?;
+        let text = String::from_utf8(bytes).map_err(|error| syntax(format!("is not UTF-8: {error}")))?;
+        let spec: PipelineSpec = toml::from_str(&text).map_err(|error| syntax(format!("\n{error}")))?;
+        let pipeline = Self { path: path.to_owned(), spec };
+        pipeline.check()?;
+        Ok(pipeline)
+    }
+
+    /// The imported task file, found beside the pipeline file.
+    pub fn import_path(&self) -> Option<PathBuf> {
+        let import = self.spec.tasks.import.as_ref()?;
+        Some(self.path.parent().unwrap_or(Path::new("")).join(import))
+    }
+
+    /// Hash of the imported task file.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read.
+    pub fn import_hash(&self) -> Result<Option<String>, PipelineError> {
+        Ok(self.import_path().map(|path| artifact::sha256_file(&path)).transpose()?)
+    }
+
+    /// How many tasks are held out when drawn.
+    pub fn n_unseen(&self) -> u32 {
+        let default = match self.spec.tasks.family {
+            Family::BlockStacking => 1000,
+            Family::ObjectSorting => SORTING_UNSEEN_TASKS,
+        };
+        self.spec.tasks.unseen.unwrap_or(default)
+    }
+
+    fn value(&self, key: &str, problem: impl Into<String>) -> PipelineError {
+        PipelineError::Value { path: self.path.clone(), key: key.to_owned(), problem: problem.into() }
+    }
+
+    fn check(&self) -> Result<(), PipelineError> {
+        self.check_name("name", &self.spec.name)?;
+        self.check_tasks()?;
+        self.check_generate()?;
+        self.check_models()?;
+        self.spec.rollout.suites.iter().enumerate().try_for_each(|(idx, suite)| self.check_suite(idx, suite))?;
+        let factor = self.spec.rollout.decisions_factor;
+        if !(1.0..=100.0).contains(&factor) {
+            return Err(self.value("rollout.decisions_factor", format!("is {factor}; allowed is 1 to 100")));
+        }
+        Ok(())
+    }
+
+    fn check_name(&self, key: &str, name: &str) -> Result<(), PipelineError> {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || name.len() > 64 || !name.chars().all(allowed) {
+            let problem = format!("is {name:?}; allowed are 1 to 64 letters, digits, '_' and '-'");
+            return Err(self.value(key, problem));
+        }
+        Ok(())
+    }
+
+    fn check_tasks(&self) -> Result<(), PipelineError> {
+        let tasks = &self.spec.tasks;
+        if tasks.train == 0 {
+            return Err(self.value("tasks.train", "is 0; at least 1 task is needed"));
+        }
+        if let Some(path) = self.import_path().filter(|path| !path.is_file()) {
+            return Err(self.value("tasks.import", format!("no such file: {}", path.display())));
+        }
+        let (train, unseen) = (tasks.train, self.n_unseen());
+        if tasks.family == Family::ObjectSorting && tasks.import.is_none() {
+            if train != SORTING_TRAIN_TASKS {
+                let problem = format!("is {train}; object_sorting has {SORTING_TRAIN_TASKS} training mappings");
+                return Err(self.value("tasks.train", problem));
+            }
+            if unseen > SORTING_UNSEEN_TASKS {
+                let problem = format!("is {unseen}; object_sorting has at most {SORTING_UNSEEN_TASKS} others");
+                return Err(self.value("tasks.unseen", problem));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_generate(&self) -> Result<(), PipelineError> {
+        let generate = &self.spec.generate;
+        if generate.trials_per_task == 0 {
+            return Err(self.value("generate.trials_per_task", "is 0; at least 1 is needed"));
+        }
+        if generate.episodes_per_shard == 0 {
+            return Err(self.value("generate.episodes_per_shard", "is 0; at least 1 is needed"));
+        }
+        if let Err(problem) = generate.simulation.check() {
+            return Err(self.value("generate.simulation", problem.to_string()));
+        }
+        self.check_counts("generate.counts", generate.counts)
+    }
+
+    fn check_counts(&self, key: &str, counts: Option<CountsSpec>) -> Result<(), PipelineError> {
+        let Some(CountsSpec { min, max }) = counts else { return Ok(()) };
+        if self.spec.tasks.family == Family::BlockStacking {
+            return Err(self.value(key, "block_stacking has no categories; leave it out"));
+        }
+        if min < 1 || max > MAX_INSTANCES || min > max {
+            let problem = format!(
+                "is {min} to {max}; allowed is 1 <= min <= max <= {MAX_INSTANCES}, as many as the table holds of one category"
+            );
+            return Err(self.value(key, problem));
+        }
+        Ok(())
+    }
+
+    fn check_models(&self) -> Result<(), PipelineError> {
+        let mut names = Vec::new();
+        for (idx, model) in self.spec.models.iter().enumerate() {
+            if model.seeds.is_empty() {
+                return Err(self.value(&format!("models[{idx}].seeds"), "is empty; at least one is needed"));
+            }
+            if let Some(train_tasks) = model.train_tasks.filter(|&n| n == 0 || n > self.spec.tasks.train) {
+                let problem = format!("is {train_tasks}; allowed is 1 to tasks.train = {}", self.spec.tasks.train);
+                return Err(self.value(&format!("models[{idx}].train_tasks"), problem));
+            }
+            for &seed in &model.seeds {
+                let name = super::layout::model_name(model.variant, model.train_tasks, seed);
+                if names.contains(&name) {
+                    return Err(self.value(&format!("models[{idx}]"), format!("{name} is there twice")));
+                }
+                names.push(name);
+            }
+            let TrainConfig { name, variant, seed, .. } = &model.training;
+            let unset = TrainConfig::default();
+            if (name, variant, seed) != (&unset.name, &unset.variant, &unset.seed) {
+                let problem = "name, variant and seed are not set here: variant and seeds belong to [[models]] itself";
+                return Err(self.value(&format!("models[{idx}].training"), problem));
+            }
+            if let Err(problem) = model.training.check() {
+                return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_suite(&self, idx: usize, suite: &SuiteSpec) -> Result<(), PipelineError> {
+        let key = |field: &str| format!("rollout.suites[{idx}].{field}");
+        self.check_name(&key("name"), &suite.name)?;
+        let earlier = &self.spec.rollout.suites[..idx];
+        if earlier.iter().any(|other| other.name == suite.name) {
+            return Err(self.value(&key("name"), format!("{:?} is there twice", suite.name)));
+        }
+        if suite.episodes == 0 {
+            return Err(self.value(&key("episodes"), "is 0; at least 1 is needed"));
+        }
+        if suite.split == Split::Unseen && self.spec.tasks.import.is_none() && self.n_unseen() == 0 {
+            return Err(self.value(&key("split"), "is unseen, but tasks.unseen is 0"));
+        }
+        self.check_counts(&key("demonstrated"), suite.demonstrated)?;
+        self.check_counts(&key("on_table"), suite.on_table)
+    }
+}
+
+impl SuiteSpec {
+    /// The counts of the demonstration.
+    pub(super) fn demonstrated(&self) -> CountsSpec {
+        self.demonstrated.unwrap_or(DEFAULT_COUNTS)
+    }
+}

@@ -1,0 +1,260 @@
+//! Stage `rollout`: every model acts every suite, shard by shard, in physics.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use serde_json::json;
+
+use crate::artifact::{FileEntry, Plan, Receipt};
+use crate::model::Decoder;
+use crate::pipeline::generate::{demonstrate, simulation_config, world};
+use crate::pipeline::layout::model_name;
+use crate::pipeline::runner::{Context, Part, Unit};
+use crate::pipeline::trials::trial;
+use crate::pipeline::{PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
+use crate::progress::Progress;
+use crate::recording::ShardWriter;
+use crate::rollout::{self, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
+use crate::task::{Task, TaskSet};
+use crate::trace::{Actor, Episode, Provenance};
+
+/// Episodes that act side by side and are committed together.
+const EPISODES_PER_SHARD: u32 = 25;
+/// How often the expert may try to demonstrate a task for a suite, each time from other initial positions.
+const DEMONSTRATION_ATTEMPTS: u64 = 20;
+/// One row an episode, all shards together.
+pub(super) const TABLE: &str = "rollouts.parquet";
+
+pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
+    let (_, task_inputs) = tasks::read(context)?;
+    let spec = &context.pipeline.spec;
+    let mut units = Vec::new();
+    for (model, seed) in actors(context) {
+        let inputs = match (model, seed) {
+            (Some(model), Some(seed)) => model_inputs(context, model, seed, &task_inputs)?,
+            _ => task_inputs.clone(),
+        };
+        let (actor_name, decoder) = match model {
+            Some(idx) => {
+                let model_spec = &spec.models[idx];
+                let name = model_name(model_spec.variant, model_spec.train_tasks, seed.unwrap_or(0));
+                (name, Some(model_spec.decoder))
+            }
+            None => ("oracle".to_owned(), None),
+        };
+        for (suite, suite_spec) in spec.rollout.suites.iter().enumerate() {
+            let config = json!({
+                "seed": spec.seed,
+                "suite": suite_spec,
+                "decoder": decoder,
+                "record": spec.rollout.record,
+                "decisions_factor": spec.rollout.decisions_factor,
+                "simulation": spec.generate.simulation,
+            });
+            let shards = suite_spec.episodes.div_ceil(EPISODES_PER_SHARD);
+            units.push(Unit {
+                name: format!("rollout {actor_name} {}", suite_spec.name),
+                dir: context.dir.rollouts(&actor_name, &suite_spec.name),
+                plan: Plan::new(Stage::Rollout.name(), shards, inputs.clone(), config),
+                part: Part::Suite { actor: model.zip(seed), suite },
+            });
+        }
+    }
+    Ok(units)
+}
+
+/// Every trained model, and the oracle where it is asked for.
+fn actors(context: &Context<'_>) -> Vec<(Option<usize>, Option<u64>)> {
+    let spec = &context.pipeline.spec;
+    let oracle = spec.rollout.oracle.then_some((None, None));
+    let models = spec.models.iter().enumerate();
+    let trained = models.flat_map(|(idx, model)| model.seeds.iter().map(move |&seed| (Some(idx), Some(seed))));
+    oracle.into_iter().chain(trained).collect()
+}
+
+fn model_inputs(
+    context: &Context<'_>,
+    model: usize,
+    seed: u64,
+    task_inputs: &BTreeMap<String, String>,
+) -> Result<BTreeMap<String, String>, PipelineError> {
+    let spec = &context.pipeline.spec.models[model];
+    let version = context.dir.model(&model_name(spec.variant, spec.train_tasks, seed)).version()?;
+    let mut inputs = task_inputs.clone();
+    inputs.insert(Stage::Train.name().to_owned(), version);
+    Ok(inputs)
+}
+
+/// What a unit's shards share.
+struct Suite<'a> {
+    context: &'a Context<'a>,
+    unit: &'a Unit,
+    spec: &'a SuiteSpec,
+    tasks: Vec<&'a Task>,
+    learned: Option<Learned>,
+}
+
+pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
+    let Part::Suite { actor, suite } = unit.part else { return Ok(()) };
+    let (task_set, _) = tasks::read(context)?;
+    let spec = &context.pipeline.spec.rollout.suites[suite];
+    let learned = actor.map(|(model, seed)| learned(context, model, seed));
+    let suite = Suite { context, unit, spec, tasks: suite_tasks(context, &task_set, spec)?, learned };
+    unit.dir.begin(&unit.plan)?;
+    let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
+    let shards: Vec<u32> = match context.options.shard {
+        Some(shard) => vec![shard],
+        None => (0..unit.plan.shards).collect(),
+    };
+    shards.into_par_iter().try_for_each(|shard| suite.shard(shard, &progress))?;
+    if context.options.shard.is_none() {
+        finish(unit, &progress)?;
+    }
+    Ok(())
+}
+
+/// Where a trained model lies and how it decodes. Each shard loads its own: a policy keeps what it has read of
+/// demonstrations.
+struct Learned {
+    folder: PathBuf,
+    decoder: Decoder,
+    seed: u64,
+}
+
+fn learned(context: &Context<'_>, model: usize, seed: u64) -> Learned {
+    let spec = &context.pipeline.spec.models[model];
+    let name = model_name(spec.variant, spec.train_tasks, seed);
+    Learned { folder: context.dir.model(&name).path().to_owned(), decoder: spec.decoder, seed }
+}
+
+fn suite_tasks<'t>(
+    context: &Context<'_>,
+    task_set: &'t TaskSet,
+    spec: &SuiteSpec,
+) -> Result<Vec<&'t Task>, PipelineError> {
+    let tasks: Vec<&Task> = task_set.of_split(spec.split).collect();
+    if tasks.is_empty() {
+        return Err(PipelineError::Value {
+            path: context.pipeline.path.clone(),
+            key: format!("rollout.suites.{}.split", spec.name),
+            problem: format!("is {}, but there is no such task", spec.split),
+        });
+    }
+    Ok(tasks)
+}
+
+/// Puts the shards' rows into one table and commits.
+fn finish(unit: &Unit, progress: &Progress) -> Result<(), PipelineError> {
+    let mut rows = RolloutRows::default();
+    for shard in 0..unit.plan.shards {
+        if let Some(receipt) = unit.dir.receipt(&unit.plan, shard)? {
+            let part = receipt.files.iter().find(|file| file.path.ends_with(".parquet"));
+            if let Some(part) = part {
+                rows.append(RolloutRows::read(&unit.dir.path().join(&part.path))?);
+            }
+        }
+    }
+    rows.write(&unit.dir.path().join(TABLE))?;
+    let manifest = unit.dir.commit(&unit.plan)?;
+    let succeeded = manifest.episodes - manifest.failed;
+    progress.finish(&format!("{succeeded} of {} succeeded", manifest.episodes));
+    Ok(())
+}
+
+impl Suite<'_> {
+    /// Does one shard unless its receipt is there.
+    fn shard(&self, shard: u32, progress: &Progress) -> Result<(), PipelineError> {
+        let Self { context, unit, spec, .. } = self;
+        let range = shard * EPISODES_PER_SHARD..spec.episodes.min((shard + 1) * EPISODES_PER_SHARD);
+        if unit.dir.receipt(&unit.plan, shard)?.is_some() {
+            progress.inc(u64::from(range.end - range.start));
+            return Ok(());
+        }
+        context.go_on()?;
+        let starts: Result<Vec<Start<'_>>, PipelineError> = range.clone().map(|episode| self.start(episode)).collect();
+        let acted = self.act(starts?)?;
+        let part = format!("parts/part-{shard:05}.parquet");
+        let seed = self.learned.as_ref().map_or(0, |learned| learned.seed);
+        RolloutRows::of(&spec.name, seed, &acted).write(&unit.dir.path().join(&part))?;
+        let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
+        files.extend(self.record(shard, &acted)?);
+        unit.dir.commit_shard(&Receipt {
+            plan_id: unit.plan.id(),
+            shard,
+            episodes: acted.len() as u64,
+            failed: acted.iter().filter(|rollout| !rollout.episode.outcome.is_success()).count() as u64,
+            files,
+        })?;
+        progress.inc(acted.len() as u64);
+        Ok(())
+    }
+
+    fn start(&self, episode: u32) -> Result<Start<'_>, PipelineError> {
+        let Self { context, spec, tasks, .. } = self;
+        let task = tasks[episode as usize % tasks.len()];
+        let demonstration = self.demonstration(task, episode)?;
+        let run_seed = context.pipeline.spec.seed;
+        let mut own = trial(run_seed, &format!("rollout/{}", spec.name), task, episode, spec.on_table);
+        if spec.on_table.is_none() {
+            own.counts.clone_from(&demonstration.provenance.counts);
+        }
+        let recorded = if episode < context.pipeline.spec.rollout.record {
+            RecordedFrames::All
+        } else {
+            RecordedFrames::Boundaries
+        };
+        let config = simulation_config(recorded, &context.pipeline.spec.generate.simulation);
+        let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
+        Ok(Start { task, demonstration, world: Box::new(world(task, &own, &config)?), provenance })
+    }
+
+    /// The expert's demonstration of a task, from initial positions that no training demonstration has.
+    fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
+        let Self { context, spec, .. } = self;
+        let config = simulation_config(RecordedFrames::Boundaries, &context.pipeline.spec.generate.simulation);
+        for attempt in 0..DEMONSTRATION_ATTEMPTS {
+            let purpose = format!("specification/{}/{attempt}", spec.name);
+            let trial = trial(context.pipeline.spec.seed, &purpose, task, episode, Some(spec.demonstrated()));
+            let demonstration = demonstrate(task, &trial, u64::from(episode), &config)?;
+            if demonstration.outcome.is_success() {
+                return Ok(demonstration);
+            }
+        }
+        Err(PipelineError::NoDemonstration {
+            suite: spec.name.clone(),
+            task_id: task.id.clone(),
+            attempts: DEMONSTRATION_ATTEMPTS,
+        })
+    }
+
+    fn act(&self, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
+        let mut policy: Box<dyn Policy> = match &self.learned {
+            Some(learned) => load_policy(&learned.folder, learned.decoder)?.1,
+            None => Box::new(Oracle::for_starts(&starts)),
+        };
+        let factor = self.context.pipeline.spec.rollout.decisions_factor;
+        let limits = Limits { decisions_factor: factor, ..Limits::default() };
+        rollout::run(policy.as_mut(), starts, limits).map_err(|source| PipelineError::Trace {
+            task_id: self.unit.name.clone(),
+            trial: 0,
+            source,
+        })
+    }
+
+    /// Records the first episodes of the suite.
+    fn record(&self, shard: u32, acted: &[RolloutEpisode]) -> Result<Option<FileEntry>, PipelineError> {
+        let n_recorded = self.context.pipeline.spec.rollout.record.saturating_sub(shard * EPISODES_PER_SHARD);
+        if n_recorded == 0 {
+            return Ok(None);
+        }
+        let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", self.unit.plan.shards);
+        let plan_json = serde_json::to_string(&self.unit.plan).unwrap_or_default();
+        let mut writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
+        for rollout in acted.iter().take(n_recorded as usize) {
+            writer.write(&rollout.episode)?;
+        }
+        writer.finish()?;
+        Ok(Some(FileEntry::of(self.unit.dir.path(), &name)?))
+    }
+}

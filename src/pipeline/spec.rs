@@ -1,0 +1,173 @@
+//! A pipeline file as it is written: names, types, defaults. Nothing is checked here beyond what a type can say.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::ConvertConfig;
+use crate::model::{Decoder, Variant};
+use crate::sim::SimulationConfig;
+use crate::task::{Family, Split};
+use crate::training::TrainConfig;
+
+/// One experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PipelineSpec {
+    /// Names the run's folder: letters, digits, `_` and `-`.
+    pub name: String,
+    /// Everything random comes from it.
+    #[serde(default)]
+    pub seed: u64,
+    /// Which tasks there are.
+    pub tasks: TasksSpec,
+    /// How the expert demonstrates them.
+    #[serde(default)]
+    pub generate: GenerateSpec,
+    /// What of the recordings comes into the dataset.
+    #[serde(default)]
+    pub convert: ConvertConfig,
+    /// What is trained.
+    #[serde(default)]
+    pub models: Vec<ModelSpec>,
+    /// How the models are evaluated.
+    #[serde(default)]
+    pub rollout: RolloutSpec,
+    /// How the results are shown.
+    #[serde(default)]
+    pub report: ReportSpec,
+}
+
+/// Which tasks there are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TasksSpec {
+    /// The kind of task.
+    pub family: Family,
+    /// How many tasks may be trained on.
+    pub train: u32,
+    /// How many are held out. Left out with `import`: all the others.
+    #[serde(default)]
+    pub unseen: Option<u32>,
+    /// A task file of the authors' format in place of drawn tasks, relative to the pipeline file.
+    #[serde(default)]
+    pub import: Option<String>,
+}
+
+/// Which frames a recording holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordedFrames {
+    /// Boundaries, and ten frames a second between them.
+    #[default]
+    All,
+    /// Boundaries of primitives alone: smaller and faster, but replays jump.
+    Boundaries,
+}
+
+/// How many instances of each category stand on the table; drawn for each trial and category.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CountsSpec {
+    /// At least; from 1.
+    pub min: u16,
+    /// At most; to 10.
+    pub max: u16,
+}
+
+/// How the expert demonstrates the training tasks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GenerateSpec {
+    /// Demonstrations of each training task, each from other initial positions.
+    pub trials_per_task: u32,
+    /// Episodes in one file.
+    pub episodes_per_shard: u32,
+    /// What is recorded.
+    pub frames: RecordedFrames,
+    /// For families with categories; 1 to 3 of each when left out.
+    pub counts: Option<CountsSpec>,
+    /// The physics.
+    pub simulation: SimulationConfig,
+}
+
+impl Default for GenerateSpec {
+    fn default() -> Self {
+        Self {
+            trials_per_task: 20,
+            episodes_per_shard: 100,
+            frames: RecordedFrames::default(),
+            counts: None,
+            simulation: SimulationConfig::default(),
+        }
+    }
+}
+
+/// One model, trained once for each seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModelSpec {
+    /// Which model.
+    pub variant: Variant,
+    /// One training run for each.
+    #[serde(default = "one_seed")]
+    pub seeds: Vec<u64>,
+    /// Train on the first so many training tasks; all when left out.
+    #[serde(default)]
+    pub train_tasks: Option<u32>,
+    /// How the chosen part of a demonstration is decoded.
+    #[serde(default)]
+    pub decoder: Decoder,
+    /// How it is trained.
+    #[serde(default)]
+    pub training: TrainConfig,
+}
+
+fn one_seed() -> Vec<u64> {
+    vec![0]
+}
+
+/// How models are evaluated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RolloutSpec {
+    /// Which tasks, and how many episodes.
+    pub suites: Vec<SuiteSpec>,
+    /// How many episodes of each suite are recorded for replay.
+    pub record: u32,
+    /// A rollout is given up after so many times the expert's decisions.
+    pub decisions_factor: f32,
+    /// Also lets the oracle, which repeats the expert, act every suite.
+    pub oracle: bool,
+}
+
+impl Default for RolloutSpec {
+    fn default() -> Self {
+        Self { suites: Vec::new(), record: 10, decisions_factor: 3.0, oracle: false }
+    }
+}
+
+/// A set of evaluation episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SuiteSpec {
+    /// Names its folder: letters, digits, `_` and `-`.
+    pub name: String,
+    /// Which tasks.
+    pub split: Split,
+    /// How many episodes; tasks are taken in turn.
+    pub episodes: u32,
+    /// Instances of each category in the demonstration.
+    #[serde(default)]
+    pub demonstrated: Option<CountsSpec>,
+    /// Instances of each category on the table; as demonstrated when left out.
+    #[serde(default)]
+    pub on_table: Option<CountsSpec>,
+}
+
+/// How results are shown.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReportSpec {
+    /// The page's title; the pipeline's name when left out.
+    pub title: Option<String>,
+}

@@ -1,0 +1,211 @@
+//! Messages in, episodes out: puts an episode together from what is read of it.
+
+use prost::Message as _;
+
+use super::calls;
+use super::error::MessageProblem;
+use super::schema::{Topic, proto};
+use super::start::{self, Start};
+use super::transform::{self, GRIPPER};
+use crate::geometry::Pose;
+use crate::scene::{BodyIndex, SceneState};
+use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall};
+
+/// Episodes being put together, one at a time. Its buffers are used again from message to message.
+#[derive(Default)]
+pub(super) struct Assembler {
+    building: Option<Box<Building>>,
+    observation: proto::Observation,
+    call: proto::ProgramCall,
+    returned: proto::ProgramReturn,
+}
+
+/// An episode of which the start has been read.
+struct Building {
+    start: Start,
+    start_nanos: u64,
+    state: SceneState,
+    /// Bodies of which no pose has been read yet.
+    unplaced: usize,
+    placed: Vec<bool>,
+    /// Transforms for this time have been read, but no observation.
+    transforms_at_nanos: Option<u64>,
+    /// Where the search for a body's name begins: transforms come in the order of bodies.
+    next_body: usize,
+    frames: Vec<Frame>,
+    calls: Vec<ProgramCall>,
+}
+
+impl Assembler {
+    /// Whether an episode has begun and not ended.
+    pub(super) fn is_building(&self) -> bool {
+        self.building.is_some()
+    }
+
+    /// Takes a message; gives the episode that it ends.
+    pub(super) fn message(
+        &mut self,
+        topic: Topic,
+        log_time_nanos: u64,
+        data: &[u8],
+    ) -> Result<Option<EpisodeParts>, MessageProblem> {
+        if topic == Topic::EpisodeStart {
+            if self.building.is_some() {
+                return Err(MessageProblem::OutOfPlace("the episode before has not ended"));
+            }
+            self.building = Some(Box::new(Building::new(log_time_nanos, data)?));
+            return Ok(None);
+        }
+        let Some(building) = &mut self.building else {
+            return Err(MessageProblem::OutOfPlace("no episode has started"));
+        };
+        match topic {
+            Topic::Transforms => building.transforms(log_time_nanos, data)?,
+            Topic::Observation => {
+                self.observation.clear();
+                self.observation.merge(data)?;
+                building.observation(log_time_nanos, &self.observation)?;
+            }
+            Topic::Call => {
+                self.call.clear();
+                self.call.merge(data)?;
+                building.call(log_time_nanos, &mut self.call)?;
+            }
+            Topic::Return => {
+                self.returned.clear();
+                self.returned.merge(data)?;
+                building.check_time(log_time_nanos, self.returned.frame)?;
+                calls::decode_return(&self.returned, &mut building.calls)?;
+            }
+            Topic::EpisodeEnd => {
+                let end = proto::EpisodeEnd::decode(data)?;
+                building.check_end(&end)?;
+                let outcome = decode_outcome(&end)?;
+                return Ok(self.building.take().map(|building| building.parts(outcome)));
+            }
+            Topic::EpisodeStart | Topic::Stack | Topic::Scene | Topic::Event | Topic::Log => {}
+        }
+        Ok(None)
+    }
+}
+
+impl Building {
+    fn new(start_nanos: u64, data: &[u8]) -> Result<Self, MessageProblem> {
+        let start = start::decode(proto::EpisodeStart::decode(data)?)?;
+        let n_bodies = start.scene.bodies.len();
+        let state = SceneState {
+            gripper_in_world: Pose::identity(),
+            opening_m: 0.0,
+            held: None,
+            bodies_in_world: vec![Pose::identity(); n_bodies],
+        };
+        Ok(Self {
+            start,
+            start_nanos,
+            state,
+            // The gripper is the last one.
+            unplaced: n_bodies + 1,
+            placed: vec![false; n_bodies + 1],
+            transforms_at_nanos: None,
+            next_body: 0,
+            frames: Vec::new(),
+            calls: Vec::new(),
+        })
+    }
+
+    fn transforms(&mut self, log_time_nanos: u64, data: &[u8]) -> Result<(), MessageProblem> {
+        if self.transforms_at_nanos.replace(log_time_nanos).is_some() {
+            return Err(MessageProblem::OutOfPlace("the transforms before have no observation"));
+        }
+        transform::decode(data, |child, pose| {
+            let position = self.place(child, pose)?;
+            self.unplaced -= usize::from(!std::mem::replace(&mut self.placed[position], true));
+            Ok(())
+        })
+    }
+
+    fn place(&mut self, child: &[u8], pose: Pose) -> Result<usize, MessageProblem> {
+        let bodies = &self.start.scene.bodies;
+        if child == GRIPPER.as_bytes() {
+            self.state.gripper_in_world = pose;
+            return Ok(bodies.len());
+        }
+        let mut candidates = (self.next_body..bodies.len()).chain(0..self.next_body);
+        let position = candidates.find(|&position| bodies[position].name.as_bytes() == child);
+        let position = position.ok_or_else(|| MessageProblem::UnknownFrame { frame: transform::text(child) })?;
+        self.next_body = position + 1;
+        self.state.bodies_in_world[position] = pose;
+        Ok(position)
+    }
+
+    fn observation(&mut self, log_time_nanos: u64, message: &proto::Observation) -> Result<(), MessageProblem> {
+        let transforms_nanos =
+            self.transforms_at_nanos.take().ok_or(MessageProblem::Missing { field: "transforms" })?;
+        expect("log time", log_time_nanos, transforms_nanos)?;
+        expect("frame", u64::from(message.frame), self.frames.len() as u64)?;
+        if self.unplaced > 0 {
+            return Err(MessageProblem::Missing { field: "transform of a body" });
+        }
+        let body = |field| move |body: u32| start::narrow(field, body).map(BodyIndex);
+        let slots = message.slots.iter().copied().map(body("body of a slot"));
+        self.frames.push(Frame {
+            time_nanos: log_time_nanos - self.start_nanos,
+            boundary: message.boundary,
+            state: SceneState {
+                opening_m: message.opening_m,
+                held: message.held.map(body("held body")).transpose()?,
+                ..self.state.clone()
+            },
+            slots: slots.collect::<Result<_, _>>()?,
+        });
+        Ok(())
+    }
+
+    fn call(&mut self, log_time_nanos: u64, message: &mut proto::ProgramCall) -> Result<(), MessageProblem> {
+        expect("call", u64::from(message.call), self.calls.len() as u64)?;
+        self.check_time(log_time_nanos, message.frame)?;
+        self.calls.push(calls::decode_call(message)?);
+        Ok(())
+    }
+
+    /// Messages of a frame stand at its time.
+    fn check_time(&self, log_time_nanos: u64, frame: u32) -> Result<(), MessageProblem> {
+        let out_of_range = MessageProblem::OutOfRange { field: "frame", found: u64::from(frame) };
+        let frame = self.frames.get(frame as usize).ok_or(out_of_range)?;
+        expect("log time", log_time_nanos, self.start_nanos + frame.time_nanos)
+    }
+
+    fn check_end(&self, message: &proto::EpisodeEnd) -> Result<(), MessageProblem> {
+        let boundary_frames = self.frames.iter().filter(|frame| frame.boundary).count();
+        expect("index", message.index, self.start.provenance.index)?;
+        expect("number of frames", self.frames.len() as u64, u64::from(message.frames))?;
+        expect("number of boundary frames", boundary_frames as u64, u64::from(message.boundary_frames))?;
+        expect("number of calls", self.calls.len() as u64, u64::from(message.calls))?;
+        if self.transforms_at_nanos.is_some() {
+            return Err(MessageProblem::OutOfPlace("the transforms before have no observation"));
+        }
+        if !self.calls.iter().all(calls::has_returned) {
+            return Err(MessageProblem::OutOfPlace("a call has not returned"));
+        }
+        Ok(())
+    }
+
+    fn parts(self, outcome: Outcome) -> EpisodeParts {
+        let Start { provenance, scene, specification_frames } = self.start;
+        EpisodeParts { provenance, scene, frames: self.frames, specification_frames, calls: self.calls, outcome }
+    }
+}
+
+fn decode_outcome(message: &proto::EpisodeEnd) -> Result<Outcome, MessageProblem> {
+    match (message.success, message.cause.as_str()) {
+        (true, "") => Ok(Outcome::Success),
+        (true, _) => Err(MessageProblem::OutOfPlace("a success has no cause")),
+        (false, word) => Cause::from_name(word)
+            .map(Outcome::Failure)
+            .ok_or_else(|| MessageProblem::UnknownWord { field: "cause", word: word.to_owned() }),
+    }
+}
+
+fn expect(field: &'static str, found: u64, expected: u64) -> Result<(), MessageProblem> {
+    if found == expected { Ok(()) } else { Err(MessageProblem::Unexpected { field, found, expected }) }
+}

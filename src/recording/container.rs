@@ -1,0 +1,204 @@
+//! What the MCAP library leaves to its users: framing of records, the checksum, and a summary in a fixed order.
+//!
+//! # Source
+//!
+//! The MCAP specification, <https://mcap.dev/spec>: "Record Structure", "Summary Section", "Footer".
+
+use std::io::{Read, Seek, SeekFrom, Write};
+
+use mcap::records::op;
+
+/// No record of ours is longer, and a reader takes none that is: a wrong length must not exhaust memory.
+pub(super) const MAX_RECORD_BYTES: usize = 64 << 20;
+/// Opcode and length before each record.
+const FRAMING_BYTES: usize = 9;
+/// The footer record and the closing magic.
+const TAIL_BYTES: u64 = 9 + 8 + 8 + 4 + 8;
+
+/// Records one after the other. Ends early, with [`Records::rest`] not empty, where no whole record follows.
+pub(super) struct Records<'a>(&'a [u8]);
+
+impl<'a> Records<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// What has not been taken yet.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.0
+    }
+}
+
+impl<'a> Iterator for Records<'a> {
+    /// Opcode, content, and the whole with its framing.
+    type Item = (u8, &'a [u8], &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (&opcode, after) = self.0.split_first()?;
+        let (length, _) = after.split_first_chunk()?;
+        let end = usize::try_from(u64::from_le_bytes(*length)).ok()?.checked_add(FRAMING_BYTES)?;
+        let (whole, rest) = self.0.split_at_checked(end)?;
+        self.0 = rest;
+        Some((opcode, &whole[FRAMING_BYTES..], whole))
+    }
+}
+
+/// Fields of a record, one after the other; `None` where the record ends too early. The library reserves whatever a
+/// text's length says, so records that no checksum has vouched for are taken apart here.
+pub(super) struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(super) fn new(record: &'a [u8]) -> Self {
+        Self(record)
+    }
+
+    fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (bytes, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*bytes)
+    }
+
+    pub(super) fn u16(&mut self) -> Option<u16> {
+        self.bytes().map(u16::from_le_bytes)
+    }
+
+    pub(super) fn u32(&mut self) -> Option<u32> {
+        self.bytes().map(u32::from_le_bytes)
+    }
+
+    pub(super) fn u64(&mut self) -> Option<u64> {
+        self.bytes().map(u64::from_le_bytes)
+    }
+
+    /// A text, which need not be UTF-8.
+    pub(super) fn text(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        let (text, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(text)
+    }
+
+    /// What has not been taken yet.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.0
+    }
+}
+
+/// CRC-32 as MCAP, zip and PNG have it.
+pub(super) fn crc32(bytes: &[u8]) -> u32 {
+    const TABLE: [u32; 256] = crc32_table();
+    !bytes.iter().fold(!0, |crc, &byte| TABLE[usize::from(crc as u8 ^ byte)] ^ (crc >> 8))
+}
+
+const fn crc32_table() -> [u32; 256] {
+    let mut table = [0; 256];
+    let mut index = 0;
+    while index < 256 {
+        let mut crc = index as u32;
+        let mut bit = 0;
+        while bit < 8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 };
+            bit += 1;
+        }
+        table[index] = crc;
+        index += 1;
+    }
+    table
+}
+
+/// The summary section of a file with the footer behind it.
+pub(super) struct Summary {
+    start: u64,
+    /// From the start of the section to the closing magic, which is not included.
+    bytes: Vec<u8>,
+}
+
+/// Why there is no sound summary.
+pub(super) enum NoSummary {
+    Io(std::io::Error),
+    /// The file does not end as MCAP files do.
+    CutOff,
+    /// The file ends as it should, but has no summary or a wrong one.
+    Absent,
+    Checksum {
+        saved: u32,
+        calculated: u32,
+    },
+}
+
+impl Summary {
+    /// Reads and checks the summary of a whole file.
+    pub(super) fn read(file: &mut (impl Read + Seek)) -> Result<Self, NoSummary> {
+        let size = file.seek(SeekFrom::End(0)).map_err(NoSummary::Io)?;
+        let footer_start = size.checked_sub(TAIL_BYTES).ok_or(NoSummary::CutOff)?;
+        let mut tail = [0; TAIL_BYTES as usize];
+        file.seek(SeekFrom::Start(footer_start)).and_then(|_| file.read_exact(&mut tail)).map_err(NoSummary::Io)?;
+        if !tail.ends_with(mcap::MAGIC) {
+            return Err(NoSummary::CutOff);
+        }
+        let (footer, _) = tail.split_at(tail.len() - mcap::MAGIC.len());
+        let Some((op::FOOTER, content, _)) = Records::new(footer).next() else { return Err(NoSummary::Absent) };
+        let start = content.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        if start == 0 || start > footer_start {
+            return Err(NoSummary::Absent);
+        }
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(start)).map_err(NoSummary::Io)?;
+        file.take(size - start - mcap::MAGIC.len() as u64).read_to_end(&mut bytes).map_err(NoSummary::Io)?;
+        let summary = Self { start, bytes };
+        summary.check()
+    }
+
+    fn check(self) -> Result<Self, NoSummary> {
+        let (content, saved) = self.bytes.split_last_chunk().ok_or(NoSummary::Absent)?;
+        let (saved, calculated) = (u32::from_le_bytes(*saved), crc32(content));
+        if saved != calculated {
+            return Err(NoSummary::Checksum { saved, calculated });
+        }
+        Ok(self)
+    }
+
+    /// The records of the section, the footer included.
+    pub(super) fn records(&self) -> Records<'_> {
+        Records::new(&self.bytes)
+    }
+
+    /// Writes the section again with schemas and channels in the order of their ids. The library takes them from a
+    /// hash map, so the bytes of two like files would differ.
+    pub(super) fn write_in_order(mut self, file: &mut (impl Write + Seek)) -> std::io::Result<()> {
+        let mut records: Vec<(u8, &[u8], &[u8])> = self.records().collect();
+        let is_keyed = |opcode: u8| opcode == op::SCHEMA || opcode == op::CHANNEL;
+        // Both groups lie before all others; the offsets of groups do not change within one.
+        records.sort_by_key(|&(opcode, content, _)| match (is_keyed(opcode), content.first_chunk()) {
+            (true, Some(id)) => (0, opcode, u16::from_le_bytes(*id)),
+            _ => (1, 0, 0),
+        });
+        let mut bytes: Vec<u8> = records.into_iter().flat_map(|(_, _, whole)| whole).copied().collect();
+        let content_end = bytes.len() - 4;
+        let checksum = crc32(&bytes[..content_end]);
+        bytes[content_end..].copy_from_slice(&checksum.to_le_bytes());
+        self.bytes = bytes;
+        file.seek(SeekFrom::Start(self.start))?;
+        file.write_all(&self.bytes)?;
+        file.seek(SeekFrom::End(0)).map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Records, crc32};
+
+    #[test]
+    fn crc32_has_its_published_check_value() {
+        assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
+    }
+
+    #[test]
+    fn records_stop_at_a_cut() {
+        let bytes = [5, 2, 0, 0, 0, 0, 0, 0, 0, b'a', b'b', 6, 9, 0];
+        let mut records = Records::new(&bytes);
+        assert_eq!(records.next().map(|(opcode, content, _)| (opcode, content)), Some((5, &b"ab"[..])));
+        assert_eq!(records.next(), None);
+        assert_eq!(records.rest(), [6, 9, 0]);
+    }
+}

@@ -1,0 +1,157 @@
+//! Reads a shard: its episodes one after the other, or one of them.
+
+use std::fs::File;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use super::assembler::Assembler;
+use super::error::RecordingError;
+use super::index::Index;
+use super::stream::{RawMessage, Stream};
+use crate::artifact::IoError;
+use crate::task::Family;
+use crate::trace::{Episode, EpisodeParts};
+
+/// A recording being read. Iterating gives its episodes in the order of writing and ends with the first error.
+///
+/// # Invariants
+///
+/// Memory holds one chunk and one episode, never the file. Every checksum is checked: when iteration ends without an
+/// error, each byte of the file was as it had been written.
+pub struct ShardReader {
+    path: PathBuf,
+    index: Index,
+    /// `None` once it has ended, well or not.
+    stream: Option<Stream>,
+    assembler: Assembler,
+    /// Position of the next episode.
+    position: u64,
+    /// Start time of each episode and the offset of its chunk, when one was asked for by position.
+    starts: Option<Vec<(u64, u64)>>,
+}
+
+impl ShardReader {
+    /// Opens a recording and checks that this version can read it.
+    ///
+    /// # Errors
+    ///
+    /// When the file is no recording of this version, is cut off, or its index is damaged.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let mut file = open(path)?;
+        let index = Index::read(path, &mut file)?;
+        let stream = Stream::whole(path, file)?;
+        Ok(Self {
+            path: path.to_owned(),
+            index,
+            stream: Some(stream),
+            assembler: Assembler::default(),
+            position: 0,
+            starts: None,
+        })
+    }
+
+    /// The plan of the stage that wrote it, as it was given to the writer.
+    pub fn plan_json(&self) -> &str {
+        &self.index.plan_json
+    }
+
+    /// The family of its tasks; `None` when it has no episodes.
+    pub fn family(&self) -> Option<Family> {
+        self.index.family
+    }
+
+    /// How many episodes its index counts.
+    pub fn n_episodes(&self) -> u64 {
+        self.index.n_episodes()
+    }
+
+    /// One episode, by its position in the file from 0. Iteration is not disturbed.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordingError::NoSuchEpisode`] behind the last one; else as in iteration, for the chunks that it lies in.
+    pub fn read_episode(&mut self, position: u64) -> Result<Episode, RecordingError> {
+        let (start_nanos, chunk_offset) = self.start_of(position)?;
+        let mut stream = Stream::from_chunk(&self.path, open(&self.path)?, chunk_offset)?;
+        let mut assembler = Assembler::default();
+        let episode = stream.messages(|message| {
+            if message.log_time_nanos < start_nanos {
+                return Ok(ControlFlow::Continue(()));
+            }
+            take(&self.path, &self.index, &mut assembler, position, message)
+        })?;
+        let parts = episode.ok_or_else(|| RecordingError::Unfinished { path: self.path.clone(), episode: position })?;
+        self.check(position, parts)
+    }
+
+    fn start_of(&mut self, position: u64) -> Result<(u64, u64), RecordingError> {
+        let starts = match self.starts.take() {
+            Some(starts) => starts,
+            None => self.index.starts(&self.path, &mut open(&self.path)?)?,
+        };
+        let start = usize::try_from(position).ok().and_then(|position| starts.get(position)).copied();
+        let episodes = starts.len() as u64;
+        self.starts = Some(starts);
+        start.ok_or_else(|| RecordingError::NoSuchEpisode { path: self.path.clone(), position, episodes })
+    }
+
+    fn next_episode(&mut self) -> Result<Option<Episode>, RecordingError> {
+        let Self { path, index, stream, assembler, position, .. } = self;
+        let Some(stream) = stream else { return Ok(None) };
+        let parts = stream.messages(|message| take(path, index, assembler, *position, message))?;
+        let episode = *position;
+        match parts {
+            Some(parts) => {
+                self.position += 1;
+                self.check(episode, parts).map(Some)
+            }
+            None if assembler.is_building() => Err(RecordingError::Unfinished { path: path.clone(), episode }),
+            None => Ok(None),
+        }
+    }
+
+    fn check(&self, episode: u64, parts: EpisodeParts) -> Result<Episode, RecordingError> {
+        Episode::new(parts).map_err(|source| RecordingError::Trace { path: self.path.clone(), episode, source })
+    }
+}
+
+impl Iterator for ShardReader {
+    type Item = Result<Episode, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.next_episode().transpose();
+        if !matches!(next, Some(Ok(_))) {
+            self.stream = None;
+        }
+        next
+    }
+}
+
+fn open(path: &Path) -> Result<File, RecordingError> {
+    Ok(File::open(path).map_err(IoError::system("open", path))?)
+}
+
+/// Gives a message to the assembler, and an error its place.
+fn take(
+    path: &Path,
+    index: &Index,
+    assembler: &mut Assembler,
+    episode: u64,
+    message: &RawMessage<'_>,
+) -> Result<ControlFlow<EpisodeParts>, RecordingError> {
+    let &RawMessage { channel, sequence, log_time_nanos, data, offset } = message;
+    let topic = index.topic(channel, sequence).map_err(|source| RecordingError::Damaged {
+        path: path.to_owned(),
+        offset,
+        source,
+    })?;
+    let Some(topic) = topic else { return Ok(ControlFlow::Continue(())) };
+    match assembler.message(topic, log_time_nanos, data) {
+        Ok(Some(parts)) => Ok(ControlFlow::Break(parts)),
+        Ok(None) => Ok(ControlFlow::Continue(())),
+        Err(problem) => {
+            let (path, topic) = (path.to_owned(), topic.name());
+            Err(RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem })
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! First divergence: at which decision failed rollouts first departed from the expert, by what differed.
+
+use serde::Serialize;
+
+use crate::report::chart::scale::{coordinate, nice_step, thousands};
+use crate::report::chart::{Key, PANEL, Tick, distinct};
+use crate::report::order;
+use crate::report::summary::{Aggregate, Divergence};
+
+/// What can differ, and its colour.
+pub(in crate::report) const KINDS: [(&str, usize); 4] = [("program", 6), ("argument", 5), ("scope", 0), ("end", 3)];
+/// Most bars of a panel.
+const MAX_BINS: i64 = 24;
+/// Fewer bars would be slabs.
+const MIN_BINS: i64 = 12;
+
+/// All panels, one a variant.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(in crate::report) struct Histograms {
+    pub(in crate::report) keys: Vec<Key>,
+    pub(in crate::report) panels: Vec<Histogram>,
+}
+
+/// One variant over all suites.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(in crate::report) struct Histogram {
+    pub(in crate::report) title: String,
+    /// How many rollouts failed.
+    pub(in crate::report) failed: u64,
+    /// How many of them diverged.
+    pub(in crate::report) diverged: u64,
+    /// How many rollouts diverged and succeeded all the same.
+    pub(in crate::report) recovered: u64,
+    pub(in crate::report) x_ticks: Vec<Tick>,
+    pub(in crate::report) y_ticks: Vec<Tick>,
+    pub(in crate::report) bars: Vec<Bar>,
+    /// Rollouts by program (rows) and kind (columns).
+    pub(in crate::report) programs: Vec<ProgramRow>,
+}
+
+/// A part of a bar, in units of the panel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(in crate::report) struct Bar {
+    pub(in crate::report) color: usize,
+    pub(in crate::report) x: String,
+    pub(in crate::report) y: String,
+    pub(in crate::report) width: String,
+    pub(in crate::report) height: String,
+    pub(in crate::report) tip: String,
+}
+
+/// How often each kind was decided otherwise in one program.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(in crate::report) struct ProgramRow {
+    pub(in crate::report) program: String,
+    pub(in crate::report) cells: Vec<Cell>,
+}
+
+/// One number of the table of programs and kinds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(in crate::report) struct Cell {
+    pub(in crate::report) count: u64,
+    /// Percent of the largest number, for the shade.
+    pub(in crate::report) shade: u64,
+}
+
+/// Nothing when no failed rollout diverged.
+pub(in crate::report) fn plot(divergences: &[Divergence], aggregates: &[Aggregate]) -> Option<Histograms> {
+    let mut variants = distinct(divergences.iter().map(|divergence| &divergence.variant));
+    variants.sort_by_cached_key(|variant| order::variant(variant));
+    let panels: Vec<Histogram> =
+        variants.iter().filter_map(|variant| panel(divergences, aggregates, variant)).collect();
+    let key = |(kind, color): (&str, usize)| Key { label: kind.to_owned(), color };
+    (!panels.is_empty()).then(|| Histograms { keys: KINDS.into_iter().map(key).collect(), panels })
+}
+
+fn panel(divergences: &[Divergence], aggregates: &[Aggregate], variant: &str) -> Option<Histogram> {
+    let own = || divergences.iter().filter(|divergence| divergence.variant == variant);
+    let failures: Vec<&Divergence> = own().filter(|divergence| divergence.ended == "failure").collect();
+    let bins = Bins::new(&failures)?;
+    let failed = aggregates.iter().filter(|row| row.variant == variant).map(|row| row.episodes - row.successes);
+    Some(Histogram {
+        title: variant.to_owned(),
+        failed: failed.sum(),
+        diverged: failures.iter().map(|one| one.episodes).sum(),
+        recovered: own().filter(|one| one.ended == "success").map(|one| one.episodes).sum(),
+        x_ticks: bins.x_ticks(),
+        y_ticks: bins.y_ticks(),
+        bars: bins.bars(),
+        programs: programs(&failures),
+    })
+}
+
+/// Failed rollouts by decision and kind.
+struct Bins {
+    /// Decisions of a bin.
+    per_bin: i64,
+    /// Rollouts of each bin, in the order of [`KINDS`].
+    counts: Vec<[u64; KINDS.len()]>,
+    /// Rollouts of the fullest bin.
+    highest: u64,
+}
+
+impl Bins {
+    /// Nothing without a failure.
+    fn new(failures: &[&Divergence]) -> Option<Self> {
+        let last = failures.iter().map(|one| one.decision.max(0)).max()?;
+        let per_bin = (last + MAX_BINS) / MAX_BINS;
+        let n_bins = (last / per_bin + 1).max(MIN_BINS);
+        let mut counts = vec![[0; KINDS.len()]; n_bins as usize];
+        for one in failures {
+            let kind = KINDS.iter().position(|(kind, _)| *kind == one.kind)?;
+            counts[(one.decision.max(0) / per_bin) as usize][kind] += one.episodes;
+        }
+        let highest = counts.iter().map(|kinds| kinds.iter().sum()).max()?;
+        Some(Self { per_bin, counts, highest })
+    }
+
+    fn n_decisions(&self) -> i64 {
+        self.counts.len() as i64 * self.per_bin
+    }
+
+    fn y(&self, count: u64) -> f64 {
+        PANEL.y(count as f64 / self.highest as f64)
+    }
+
+    fn x_ticks(&self) -> Vec<Tick> {
+        let n_decisions = self.n_decisions();
+        let step = nice_step(n_decisions as f64, 5.0).max(1.0) as usize;
+        let middle = |decision: i64| PANEL.x((decision as f64 + 0.5) / n_decisions as f64);
+        let tick = |decision: i64| Tick { at: coordinate(middle(decision)), label: thousands(decision as u64) };
+        (0..n_decisions).step_by(step).map(tick).collect()
+    }
+
+    fn y_ticks(&self) -> Vec<Tick> {
+        let step = nice_step(self.highest as f64, 4.0).max(1.0) as usize;
+        let tick = |count: u64| Tick { at: coordinate(self.y(count)), label: thousands(count) };
+        (0..=self.highest).step_by(step).map(tick).collect()
+    }
+
+    fn bars(&self) -> Vec<Bar> {
+        let width = (PANEL.x(1.0) - PANEL.x(0.0)) / self.counts.len() as f64;
+        let mut bars = Vec::new();
+        for (bin, kinds) in self.counts.iter().enumerate() {
+            let x = PANEL.x(0.0) + (bin as f64 + 0.08) * width;
+            let mut below = 0;
+            for ((kind, color), &count) in KINDS.into_iter().zip(kinds).filter(|(_, count)| **count > 0) {
+                let (top, base) = (self.y(below + count), self.y(below));
+                bars.push(Bar {
+                    color,
+                    x: coordinate(x),
+                    y: coordinate(top),
+                    width: coordinate(0.84 * width),
+                    height: coordinate(base - top),
+                    tip: format!("{}: {kind}, {count} rollouts", bin_name(bin as i64, self.per_bin)),
+                });
+                below += count;
+            }
+        }
+        bars
+    }
+}
+
+fn bin_name(bin: i64, per_bin: i64) -> String {
+    match per_bin {
+        1 => format!("decision {bin}"),
+        _ => format!("decisions {} to {}", bin * per_bin, (bin + 1) * per_bin - 1),
+    }
+}
+
+fn programs(failures: &[&Divergence]) -> Vec<ProgramRow> {
+    let mut names = distinct(failures.iter().map(|one| &one.program));
+    names.sort_by_cached_key(|program| order::level(program));
+    let count = |program: &str, kind: &str| -> u64 {
+        failures.iter().filter(|one| one.program == program && one.kind == kind).map(|one| one.episodes).sum()
+    };
+    let highest = names.iter().flat_map(|name| KINDS.map(|(kind, _)| count(name, kind))).max().unwrap_or(0).max(1);
+    let cell = |count: u64| Cell { count, shade: 100 * count / highest };
+    let row = |name: &String| ProgramRow {
+        program: name.clone(),
+        cells: KINDS.map(|(kind, _)| cell(count(name, kind))).to_vec(),
+    };
+    names.iter().map(row).collect()
+}

@@ -1,0 +1,58 @@
+//! `results.csv` and `curves.csv`: the figures as tables, by Polars.
+
+use polars::prelude::{CsvWriter, DataFrame, SerWriter as _, df};
+
+use crate::report::ReportError;
+use crate::report::metrics::{Curve, PARTS};
+use crate::report::summary::SuiteResult;
+
+/// Digits behind the point: finer than any interval, coarse enough to read.
+const PRECISION: usize = 6;
+
+/// One row for each variant, suite and training seed; causes as `name=count` with `;` between.
+pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
+    let text = |of: fn(&SuiteResult) -> &str| results.iter().map(of).collect::<Vec<_>>();
+    let real = |of: fn(&SuiteResult) -> f64| results.iter().map(of).collect::<Vec<_>>();
+    let whole = |of: fn(&SuiteResult) -> u64| results.iter().map(of).collect::<Vec<_>>();
+    let cause = |(cause, count): (&String, &u64)| format!("{cause}={count}");
+    let causes = |result: &SuiteResult| result.causes.iter().map(cause).collect::<Vec<_>>().join(";");
+    let table = df!(
+        "variant" => text(|result| &result.variant),
+        "suite" => text(|result| &result.suite),
+        "seed" => results.iter().map(|result| result.seed).collect::<Vec<_>>(),
+        "episodes" => whole(|result| result.episodes),
+        "successes" => whole(|result| result.successes),
+        "success_rate" => real(|result| result.success_rate),
+        "wilson_low" => real(|result| result.wilson_low),
+        "wilson_high" => real(|result| result.wilson_high),
+        "causes" => results.iter().map(causes).collect::<Vec<_>>(),
+        "mean_calls" => real(|result| result.mean_calls),
+        "mean_sim_secs" => real(|result| result.mean_sim_secs),
+    );
+    write(table.map_err(ReportError::Query)?)
+}
+
+/// One row for each variant, training seed, level and point; a loss that was not recorded is empty.
+pub(super) fn curves(curves: &[Curve]) -> Result<Vec<u8>, ReportError> {
+    let points = || curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)));
+    let table = df!(
+        "variant" => points().map(|(curve, _)| curve.variant.as_str()).collect::<Vec<_>>(),
+        "seed" => points().map(|(curve, _)| curve.seed).collect::<Vec<_>>(),
+        "level" => points().map(|(curve, _)| curve.level.as_str()).collect::<Vec<_>>(),
+        "step" => points().map(|(_, point)| point.step).collect::<Vec<_>>(),
+    );
+    let mut table = table.map_err(ReportError::Query)?;
+    for (part_idx, part) in PARTS.into_iter().enumerate() {
+        let losses: Vec<Option<f64>> = points().map(|(_, point)| point.losses[part_idx]).collect();
+        let column = df!(part => losses).map_err(ReportError::Query)?;
+        table.hstack_mut(column.columns()).map_err(ReportError::Query)?;
+    }
+    write(table)
+}
+
+fn write(mut table: DataFrame) -> Result<Vec<u8>, ReportError> {
+    let mut bytes = Vec::new();
+    let writer = CsvWriter::new(&mut bytes).with_float_precision(Some(PRECISION));
+    writer.n_threads(1).finish(&mut table).map_err(ReportError::Query)?;
+    Ok(bytes)
+}

@@ -1,0 +1,62 @@
+//! Parquet files as Polars frames whose columns are as their schema says.
+//!
+//! # Errors
+//!
+//! A column that is missing or of another type is named with its file before any row is read.
+
+use std::path::{Path, PathBuf};
+
+use polars::prelude::{
+    Column, DataFrame, DataType, LazyFrame, PlRefPath, PlSmallStr, PolarsError, ScanArgsParquet, col,
+};
+
+use crate::report::ReportError;
+
+/// Opens a file, of which nothing but the schema is read, and leaves only the columns that are asked for.
+pub(super) fn scan(path: &Path, columns: &[(&str, DataType)]) -> Result<LazyFrame, ReportError> {
+    let unreadable = |source: PolarsError| ReportError::Table { path: path.to_owned(), source };
+    let source = PlRefPath::try_from_path(path).map_err(unreadable)?;
+    let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
+    let mut frame = LazyFrame::scan_parquet(source, options).map_err(unreadable)?;
+    let schema = frame.collect_schema().map_err(unreadable)?;
+    for (name, expected) in columns {
+        let problem = match schema.get(name) {
+            None => format!(
+                "is missing; there are {}",
+                schema.iter_names().map(PlSmallStr::as_str).collect::<Vec<_>>().join(", ")
+            ),
+            Some(found) if found != expected => format!("is {found}, not {expected}"),
+            Some(_) => continue,
+        };
+        return Err(ReportError::Column { path: path.to_owned(), column: (*name).to_owned(), problem });
+    }
+    Ok(frame.select(columns.iter().map(|(name, _)| col(*name)).collect::<Vec<_>>()))
+}
+
+/// Reads the rows of a query over files.
+pub(super) fn collect(frame: LazyFrame, of: &[PathBuf]) -> Result<DataFrame, ReportError> {
+    let path = of.first().cloned().unwrap_or_default();
+    frame.collect().map_err(|source| ReportError::Table { path, source })
+}
+
+/// The columns of a frame that was asked for by name: only a wrong query can miss one.
+pub(super) struct Rows<'a>(pub(super) &'a DataFrame);
+
+impl Rows<'_> {
+    fn column(&self, name: &str) -> Result<&Column, ReportError> {
+        self.0.column(name).map_err(ReportError::Query)
+    }
+
+    /// Text, empty where there is none.
+    pub(super) fn text(&self, name: &str) -> Result<Vec<String>, ReportError> {
+        let column = self.column(name)?.str().map_err(ReportError::Query)?;
+        Ok(column.iter().map(|value| value.unwrap_or_default().to_owned()).collect())
+    }
+
+    /// Whole numbers, 0 where there is none.
+    pub(super) fn whole(&self, name: &str) -> Result<Vec<i64>, ReportError> {
+        let column = self.column(name)?.cast(&DataType::Int64).map_err(ReportError::Query)?;
+        let column = column.i64().map_err(ReportError::Query)?;
+        Ok(column.iter().map(Option::unwrap_or_default).collect())
+    }
+}

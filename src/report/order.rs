@@ -1,0 +1,45 @@
+//! The order in which variants, suites and levels are told: always the same, whatever the order of files and rows.
+
+use crate::program::Program;
+use crate::task::Family;
+
+/// Variants from the paper's model to its ancestor; the oracle stands last.
+const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru", "npi", "oracle"];
+
+/// What a suite asks of a family.
+const PARTS: [&str; 4] = ["unseen", "seen", "topology", "adversary"];
+
+/// A word of a name: letters or a number.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Word {
+    Number(u64),
+    Letters(String),
+}
+
+/// Sorts `sorting_4` before `sorting_40` and both after `sorting`.
+fn natural(name: &str) -> Vec<Word> {
+    let words = name.split('_').map(|word| word.parse().map_or_else(|_| Word::Letters(word.to_owned()), Word::Number));
+    words.collect()
+}
+
+/// Known variants first, each before its form with the paper's encoder; others behind.
+pub(super) fn variant(name: &str) -> (usize, Vec<Word>) {
+    let base = name.strip_suffix("_paper").unwrap_or(name);
+    let rank = VARIANTS.iter().position(|&known| known == base).unwrap_or(VARIANTS.len());
+    (rank, natural(name))
+}
+
+/// Families in their order; within one the held-out tasks first, since they are what counts.
+pub(super) fn suite(name: &str) -> (usize, usize, Vec<Word>) {
+    let (family, part) = name.split_once('_').unwrap_or((name, ""));
+    let family = Family::ALL.iter().position(|known| known.short_name() == family).unwrap_or(Family::ALL.len());
+    let part = part.split('_').next().unwrap_or_default();
+    let part = PARTS.iter().position(|&known| known == part).unwrap_or(PARTS.len());
+    (family, part, natural(name))
+}
+
+/// Programs from the root down; other names behind.
+pub(super) fn level(name: &str) -> (usize, Vec<Word>) {
+    let rank = Program::ALL.iter().position(|program| program.name() == name).unwrap_or(Program::ALL.len());
+    (rank, natural(name))
+}

@@ -1,0 +1,203 @@
+//! `index.html`: the report as one page that needs no other file.
+//!
+//! Numbers become words and places here and in [`chart`](super::chart); the look is in the templates beside this file.
+
+use minijinja::{Environment, UndefinedBehavior};
+use serde::Serialize;
+
+use crate::report::chart::bars::{self, BarPlot};
+use crate::report::chart::curves::{self, CurveGrid};
+use crate::report::chart::dots::{self, DotPlot};
+use crate::report::chart::histogram::{self, Histograms};
+use crate::report::chart::scale::{percent, thousands};
+use crate::report::chart::{Key, PANEL, Panel, color_of, distinct};
+use crate::report::metrics::{self, Curve};
+use crate::report::order;
+use crate::report::summary::{Aggregate, Report, SuiteResult};
+
+/// Most headline figures.
+const N_TILES: usize = 4;
+
+/// What the template is filled in with.
+#[derive(Serialize)]
+struct Page<'a> {
+    report: &'a Report,
+    style: &'static str,
+    panel: Panel,
+    lede: Vec<String>,
+    tiles: Vec<Tile>,
+    dots: Option<DotPlot>,
+    rows: Vec<Row>,
+    seeds: Vec<SeedRow>,
+    bars: Option<BarPlot>,
+    variants: Vec<Key>,
+    curves: Vec<CurveGrid>,
+    /// Most training steps behind a point of a curve.
+    steps_per_point: String,
+    divergence: Option<Histograms>,
+}
+
+/// A headline figure.
+#[derive(Serialize)]
+struct Tile {
+    suite: String,
+    variant: String,
+    value: String,
+    low: String,
+    high: String,
+    rollouts: String,
+    paper: Option<String>,
+    /// Percentage points above the paper's, with sign.
+    lead: Option<String>,
+}
+
+/// A line of the table over training seeds.
+#[derive(Serialize)]
+struct Row {
+    suite: String,
+    variant: String,
+    color: usize,
+    mean: String,
+    low: String,
+    high: String,
+    /// Lowest and highest of the seeds, when there are several.
+    range: Option<(String, String)>,
+    seeds: u64,
+    episodes: String,
+    paper: Option<String>,
+    starts_suite: bool,
+}
+
+/// A line of the table of training seeds.
+#[derive(Serialize)]
+struct SeedRow {
+    suite: String,
+    variant: String,
+    seed: i64,
+    successes: String,
+    episodes: String,
+    rate: String,
+    low: String,
+    high: String,
+    calls: String,
+    sim_secs: String,
+}
+
+/// The page of a report.
+pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, minijinja::Error> {
+    let names = report.aggregates.iter().map(|row| &row.variant).chain(curves.iter().map(|curve| &curve.variant));
+    let mut names = distinct(names);
+    names.sort_by_cached_key(|name| order::variant(name));
+    let trained = distinct(curves.iter().map(|curve| &curve.variant));
+    let key = |name: &String| Key { label: name.clone(), color: color_of(&names, name) };
+    let last_step = curves.iter().flat_map(|curve| &curve.points).map(|point| point.step).max().unwrap_or(0);
+    let steps_per_point = metrics::steps_per_bin(last_step) as u64;
+    let page = Page {
+        report,
+        style: include_str!("style.css"),
+        panel: PANEL,
+        lede: lede(report),
+        tiles: tiles(&report.aggregates),
+        dots: dots::plot(&report.aggregates, &report.results, &names),
+        rows: rows(&report.aggregates, &names),
+        seeds: report.results.iter().map(seed_row).collect(),
+        bars: bars::plot(&report.aggregates),
+        variants: trained.iter().map(key).collect(),
+        curves: curves::grids(curves, &names),
+        steps_per_point: plural(steps_per_point, "step", "steps"),
+        divergence: histogram::plot(&report.divergences, &report.aggregates),
+    };
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    environment.set_trim_blocks(true);
+    environment.set_lstrip_blocks(true);
+    environment.add_template("charts.html.j2", include_str!("charts.html.j2"))?;
+    environment.add_template("page.html.j2", include_str!("page.html.j2"))?;
+    environment.get_template("page.html.j2")?.render(page)
+}
+
+/// A name for reading: `stacking_unseen` is `Stacking · unseen`.
+pub(super) fn title_of(name: &str) -> String {
+    let (first, rest) = name.split_once('_').unwrap_or((name, ""));
+    let mut letters = first.chars();
+    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect();
+    if rest.is_empty() { first } else { format!("{first} · {}", rest.replace('_', " ")) }
+}
+
+fn plural(count: u64, one: &str, many: &str) -> String {
+    format!("{} {}", thousands(count), if count == 1 { one } else { many })
+}
+
+fn lede(report: &Report) -> Vec<String> {
+    let episodes: u64 = report.aggregates.iter().map(|row| row.episodes).sum();
+    if episodes == 0 {
+        return Vec::new();
+    }
+    let mut seeds: Vec<i64> = report.results.iter().map(|row| row.seed).collect();
+    seeds.sort_unstable();
+    seeds.dedup();
+    let variants = distinct(report.aggregates.iter().map(|row| &row.variant)).len() as u64;
+    let suites = distinct(report.aggregates.iter().map(|row| &row.suite)).len() as u64;
+    vec![
+        plural(episodes, "rollout", "rollouts"),
+        plural(suites, "suite", "suites"),
+        plural(variants, "variant", "variants"),
+        plural(seeds.len() as u64, "training seed", "training seeds"),
+    ]
+}
+
+/// The first variant's suites: it is the one the run is about.
+fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
+    let lead = aggregates.iter().map(|row| &row.variant).min_by_key(|variant| order::variant(variant));
+    let own = aggregates.iter().filter(|row| Some(&row.variant) == lead);
+    let tile = |row: &Aggregate| Tile {
+        suite: title_of(&row.suite),
+        variant: row.variant.clone(),
+        value: percent(row.mean_success_rate),
+        low: percent(row.wilson_low),
+        high: percent(row.wilson_high),
+        rollouts: plural(row.episodes, "rollout", "rollouts"),
+        paper: row.paper_success_rate.map(percent),
+        lead: row.paper_success_rate.map(|paper| points(row.mean_success_rate - paper)),
+    };
+    own.take(N_TILES).map(tile).collect()
+}
+
+/// A difference in percentage points, with a true minus sign.
+fn points(difference: f64) -> String {
+    let sign = if difference < 0.0 { '\u{2212}' } else { '+' };
+    format!("{sign}{:.1}", 100.0 * difference.abs())
+}
+
+fn rows(aggregates: &[Aggregate], variants: &[String]) -> Vec<Row> {
+    let starts_suite = |at: usize| at == 0 || aggregates[at - 1].suite != aggregates[at].suite;
+    let row = |(at, row): (usize, &Aggregate)| Row {
+        suite: row.suite.clone(),
+        variant: row.variant.clone(),
+        color: color_of(variants, &row.variant),
+        mean: percent(row.mean_success_rate),
+        low: percent(row.wilson_low),
+        high: percent(row.wilson_high),
+        range: (row.seeds > 1).then(|| (percent(row.lowest_success_rate), percent(row.highest_success_rate))),
+        seeds: row.seeds,
+        episodes: thousands(row.episodes),
+        paper: row.paper_success_rate.map(percent),
+        starts_suite: starts_suite(at),
+    };
+    aggregates.iter().enumerate().map(row).collect()
+}
+
+fn seed_row(row: &SuiteResult) -> SeedRow {
+    SeedRow {
+        suite: row.suite.clone(),
+        variant: row.variant.clone(),
+        seed: row.seed,
+        successes: thousands(row.successes),
+        episodes: thousands(row.episodes),
+        rate: percent(row.success_rate),
+        low: percent(row.wilson_low),
+        high: percent(row.wilson_high),
+        calls: format!("{:.1}", row.mean_calls),
+        sim_secs: format!("{:.1}", row.mean_sim_secs),
+    }
+}

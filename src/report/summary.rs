@@ -1,0 +1,148 @@
+//! `report.json`: the edge types.
+//!
+//! # Input and output
+//!
+//! schemas/report.schema.json, generated from these types. Shares are from 0 to 1; intervals are Wilson's at 95 %.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::report::PaperValue;
+
+/// Version of the file.
+pub(super) const SCHEMA_VERSION: u32 = 1;
+
+/// Everything the report says in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Report {
+    /// Version of this form: 1.
+    pub schema_version: u32,
+    /// Version of the program that wrote it.
+    pub ntp_version: String,
+    /// What the run is called.
+    pub title: String,
+    /// One for each variant, suite and training seed.
+    pub results: Vec<SuiteResult>,
+    /// One for each variant and suite, over training seeds.
+    pub aggregates: Vec<Aggregate>,
+    /// Where rollouts first decided otherwise than the expert.
+    pub divergences: Vec<Divergence>,
+    /// The end of each training curve; the whole curves are in curves.csv.
+    pub training: Vec<TrainingEnd>,
+    /// The paper's figures.
+    pub paper: Vec<PaperValue>,
+    /// What else there is to say of the run.
+    pub facts: Vec<Fact>,
+    /// What was read.
+    pub inputs: Vec<InputFile>,
+}
+
+/// The rollouts of one trained model in one suite.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SuiteResult {
+    /// The model's variant.
+    pub variant: String,
+    /// The set of evaluation tasks.
+    pub suite: String,
+    /// The seed of its training.
+    pub seed: i64,
+    /// How many rollouts.
+    pub episodes: u64,
+    /// How many of them succeeded.
+    pub successes: u64,
+    /// Share of successes.
+    pub success_rate: f64,
+    /// Lower end of its interval.
+    pub wilson_low: f64,
+    /// Upper end of its interval.
+    pub wilson_high: f64,
+    /// Failures by cause.
+    pub causes: BTreeMap<String, u64>,
+    /// Program calls a rollout, on average.
+    pub mean_calls: f64,
+    /// Simulated seconds a rollout, on average.
+    pub mean_sim_secs: f64,
+}
+
+/// One variant in one suite, over training seeds.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Aggregate {
+    /// The models' variant.
+    pub variant: String,
+    /// The set of evaluation tasks.
+    pub suite: String,
+    /// How many training seeds.
+    pub seeds: u64,
+    /// Rollouts of all seeds.
+    pub episodes: u64,
+    /// How many of them succeeded.
+    pub successes: u64,
+    /// Mean over seeds of their shares of successes.
+    pub mean_success_rate: f64,
+    /// The lowest share of a seed.
+    pub lowest_success_rate: f64,
+    /// The highest share of a seed.
+    pub highest_success_rate: f64,
+    /// Lower end of the interval of all seeds' rollouts taken together.
+    pub wilson_low: f64,
+    /// Upper end of the interval of all seeds' rollouts taken together.
+    pub wilson_high: f64,
+    /// Failures by cause.
+    pub causes: BTreeMap<String, u64>,
+    /// The paper's share of successes, where it gives one.
+    pub paper_success_rate: Option<f64>,
+}
+
+/// Rollouts of a variant in a suite whose first departure from the expert is of one kind, at one decision.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct Divergence {
+    /// The model's variant.
+    pub variant: String,
+    /// The set of evaluation tasks.
+    pub suite: String,
+    /// `success` or `failure`: how these rollouts ended all the same.
+    pub ended: String,
+    /// Index of the decision, from 0.
+    pub decision: i64,
+    /// What differed: `program`, `argument`, `scope` or `end`.
+    pub kind: String,
+    /// The program that decided.
+    pub program: String,
+    /// How many rollouts.
+    pub episodes: u64,
+}
+
+/// The losses of one program level at the end of a training.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TrainingEnd {
+    /// The model's variant.
+    pub variant: String,
+    /// The seed of its training.
+    pub seed: i64,
+    /// The program level.
+    pub level: String,
+    /// The last step.
+    pub step: i64,
+    /// Mean total loss about it; `None` where none was recorded.
+    pub loss_total: Option<f64>,
+}
+
+/// A line of the run's facts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Fact {
+    /// What is told.
+    pub name: String,
+    /// Its value, with its unit.
+    pub value: String,
+}
+
+/// A table that was read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct InputFile {
+    /// Relative to the run directory where it lies in it.
+    pub path: String,
+    /// SHA-256 in hexadecimal.
+    pub sha256: String,
+}

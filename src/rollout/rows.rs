@@ -1,0 +1,160 @@
+//! Rollouts as rows of `rollouts.parquet` (schemas/parquet/rollouts.message).
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::rollout::RolloutEpisode;
+use crate::table::{self, Column, TableError, TableSchema};
+
+/// One row an episode.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RolloutRows {
+    rows: Vec<RolloutRow>,
+}
+
+/// The columns of schemas/parquet/rollouts.message.
+#[derive(Clone, Debug, PartialEq)]
+struct RolloutRow {
+    variant: String,
+    suite: String,
+    training_seed: i64,
+    episode: i64,
+    task_id: String,
+    split: String,
+    outcome: String,
+    success: bool,
+    cause: Option<String>,
+    calls: i64,
+    decisions: i64,
+    first_divergence: Option<i64>,
+    divergence_kind: Option<String>,
+    divergence_program: Option<String>,
+    sim_secs: f64,
+}
+
+impl RolloutRows {
+    /// The rows of a suite's episodes.
+    pub fn of(suite: &str, training_seed: u64, acted: &[RolloutEpisode]) -> Self {
+        Self { rows: acted.iter().map(|rollout| RolloutRow::of(suite, training_seed, rollout)).collect() }
+    }
+
+    /// Adds rows at the end.
+    pub fn append(&mut self, other: Self) {
+        self.rows.extend(other.rows);
+    }
+
+    /// How many episodes, and how many of them succeeded.
+    pub fn successes(&self) -> (usize, usize) {
+        (self.rows.len(), self.rows.iter().filter(|row| row.success).count())
+    }
+
+    /// How often each cause of failure was named.
+    pub fn causes(&self) -> BTreeMap<String, usize> {
+        let mut causes = BTreeMap::new();
+        for cause in self.rows.iter().filter_map(|row| row.cause.clone()) {
+            *causes.entry(cause).or_default() += 1;
+        }
+        causes
+    }
+
+    /// Writes the table.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), TableError> {
+        let rows = &self.rows;
+        let text = |get: fn(&RolloutRow) -> &String| Column::Text(rows.iter().map(|row| get(row).clone()).collect());
+        let optional = |get: fn(&RolloutRow) -> &Option<String>| {
+            Column::OptionalText(rows.iter().map(|row| get(row).clone()).collect())
+        };
+        let int = |get: fn(&RolloutRow) -> i64| Column::Int64(rows.iter().map(get).collect());
+        let columns = vec![
+            ("variant", text(|row| &row.variant)),
+            ("suite", text(|row| &row.suite)),
+            ("training_seed", int(|row| row.training_seed)),
+            ("episode", int(|row| row.episode)),
+            ("task_id", text(|row| &row.task_id)),
+            ("split", text(|row| &row.split)),
+            ("outcome", text(|row| &row.outcome)),
+            ("success", Column::Boolean(rows.iter().map(|row| row.success).collect())),
+            ("cause", optional(|row| &row.cause)),
+            ("calls", int(|row| row.calls)),
+            ("decisions", int(|row| row.decisions)),
+            ("first_divergence", Column::OptionalInt64(rows.iter().map(|row| row.first_divergence).collect())),
+            ("divergence_kind", optional(|row| &row.divergence_kind)),
+            ("divergence_program", optional(|row| &row.divergence_program)),
+            ("sim_secs", Column::Float64(rows.iter().map(|row| row.sim_secs).collect())),
+        ];
+        table::write(path, &TableSchema::ROLLOUTS, columns)
+    }
+
+    /// Reads the table.
+    ///
+    /// # Errors
+    ///
+    /// When it is not there or not such a table.
+    pub fn read(path: &Path) -> Result<Self, TableError> {
+        let mut columns = table::read(path, &TableSchema::ROLLOUTS)?;
+        let mut variant = columns.text("variant")?.into_iter();
+        let mut suite = columns.text("suite")?.into_iter();
+        let mut training_seed = columns.int64("training_seed")?.into_iter();
+        let mut episode = columns.int64("episode")?.into_iter();
+        let mut task_id = columns.text("task_id")?.into_iter();
+        let mut split = columns.text("split")?.into_iter();
+        let mut outcome = columns.text("outcome")?.into_iter();
+        let mut success = columns.boolean("success")?.into_iter();
+        let mut cause = columns.optional_text("cause")?.into_iter();
+        let mut calls = columns.int64("calls")?.into_iter();
+        let mut decisions = columns.int64("decisions")?.into_iter();
+        let mut first_divergence = columns.optional_int64("first_divergence")?.into_iter();
+        let mut divergence_kind = columns.optional_text("divergence_kind")?.into_iter();
+        let mut divergence_program = columns.optional_text("divergence_program")?.into_iter();
+        let mut sim_secs = columns.float64("sim_secs")?.into_iter();
+        let mut next = || {
+            Some(RolloutRow {
+                variant: variant.next()?,
+                suite: suite.next()?,
+                training_seed: training_seed.next()?,
+                episode: episode.next()?,
+                task_id: task_id.next()?,
+                split: split.next()?,
+                outcome: outcome.next()?,
+                success: success.next()?,
+                cause: cause.next()?,
+                calls: calls.next()?,
+                decisions: decisions.next()?,
+                first_divergence: first_divergence.next()?,
+                divergence_kind: divergence_kind.next()?,
+                divergence_program: divergence_program.next()?,
+                sim_secs: sim_secs.next()?,
+            })
+        };
+        Ok(Self { rows: std::iter::from_fn(&mut next).collect() })
+    }
+}
+
+impl RolloutRow {
+    fn of(suite: &str, training_seed: u64, rollout: &RolloutEpisode) -> Self {
+        let RolloutEpisode { episode, decisions, first_divergence } = rollout;
+        let provenance = &episode.provenance;
+        let last_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
+        Self {
+            variant: provenance.actor.name().to_owned(),
+            suite: suite.to_owned(),
+            training_seed: training_seed as i64,
+            episode: provenance.index as i64,
+            task_id: provenance.task_id.clone(),
+            split: provenance.split.name().to_owned(),
+            outcome: episode.outcome.to_string(),
+            success: episode.outcome.is_success(),
+            cause: episode.outcome.cause().map(|cause| cause.name().to_owned()),
+            calls: episode.calls.len() as i64,
+            decisions: i64::from(*decisions),
+            first_divergence: first_divergence.map(|divergence| i64::from(divergence.decision)),
+            divergence_kind: first_divergence.map(|divergence| divergence.kind.name().to_owned()),
+            divergence_program: first_divergence.map(|divergence| divergence.program.name().to_owned()),
+            sim_secs: last_nanos as f64 / 1e9,
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! The three actions of the robot API, as motions of the gripper.
+
+use rapier3d::math::{Pose as EnginePose, Vector};
+
+use crate::robot::{Action, GRASP_M, HOVER_M};
+use crate::scene::{BodyIndex, Mobility, Shape, SlotIndex};
+use crate::sim::Simulation;
+use crate::sim::gripper::{Gripper, MAX_OPENING_M, TIP_M};
+use crate::sim::motion::{Motion, Tool};
+use crate::sim::sweep::AtStart;
+use crate::sim::{drop_spot, grasp};
+use crate::trace::Cause;
+
+/// Least height of gripper and load above everything on the way across, in metres.
+const CLEARANCE_M: f32 = 0.02;
+/// How near the gripper comes to what it must not touch, in metres.
+const MARGIN_M: f32 = 0.002;
+/// How high above what lies below a held body is let go, in metres.
+const SET_DOWN_M: f32 = 0.001;
+/// The same in a container, where what lies below is uneven.
+const DROP_M: f32 = 0.008;
+/// A body that was just gripped is lifted by the engine this far, until it has left what it stood on, in metres.
+const LIFT_OFF_M: f32 = 0.008;
+/// Fingers nearer to a body than this touch it, in metres.
+const TOUCH_M: f32 = 0.000_3;
+/// Speed of each closing finger, in metres per second.
+const CLOSE_M_PER_S: f32 = 0.25;
+
+/// What is known of the way ahead.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Air {
+    /// Nothing that sleeps stands in it.
+    Clear,
+    /// Something may: the engine decides.
+    Unknown,
+}
+
+impl Simulation {
+    pub(super) fn perform(&mut self, action: Action) -> Result<(), Cause> {
+        match action {
+            Action::MoveTo(slot) => self.move_to(slot),
+            Action::Grip if self.gripper.held.is_some() => Ok(()),
+            Action::Grip => self.grip(),
+            Action::Release => match self.gripper.held {
+                None => {
+                    self.open();
+                    Ok(())
+                }
+                Some(_) => self.release(),
+            },
+        }
+    }
+
+    fn move_to(&mut self, slot: SlotIndex) -> Result<(), Cause> {
+        let Some(&body) = self.locked().get(usize::from(slot.0)) else {
+            return Err(Cause::TimeLimit);
+        };
+        let target = self.body_in_world(body).translation;
+        let rim_m = match self.scene.body(body).shape {
+            Shape::OpenBox { inner_m: [_, _, height], .. } => height,
+            _ => 0.0,
+        };
+        let hover_z = target.z + rim_m + HOVER_M;
+        let held = self.gripper.held_handle();
+        let lowest_z = self.gripper.lowest_z(&self.world);
+        let below_m = self.gripper.tool.position.z - lowest_z;
+        let transit_z = (self.world.top_z(held) + below_m + CLEARANCE_M).max(hover_z).max(self.gripper.tool.position.z);
+        self.rise(transit_z);
+        let over = Vector::new(target.x, target.y, transit_z);
+        self.follow(Tool { position: over, yaw_rad: 0.0, ..self.gripper.tool }, |_| Air::Clear);
+        self.sink(hover_z, CLEARANCE_M);
+        Ok(())
+    }
+
+    fn grip(&mut self) -> Result<(), Cause> {
+        self.open();
+        let found = self.world.below(self.gripper.tool.position, None);
+        let found_z = self.gripper.tool.position.z - found.map_or(0.0, |hit| hit.distance_m);
+        let aim = found.and_then(|hit| hit.body).filter(|&body| self.scene.body(body).mobility == Mobility::Movable);
+        let Some(body) = aim else {
+            self.sink(found_z + TIP_M, MARGIN_M);
+            self.close_on_air();
+            return self.miss();
+        };
+        let yaw_rad =
+            grasp::yaw_rad(&self.scene.body(body).shape, &self.world.in_world(body), self.gripper.tool.yaw_rad);
+        self.follow(Tool { yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
+        self.sink(self.world.in_world(body).translation.z + GRASP_M, 0.0);
+        if !self.close_on(body) || !grasp::is_between_fingers(&self.gripper.tool, &self.world.in_world(body)) {
+            return self.miss();
+        }
+        self.gripper.hold(&mut self.world, body);
+        self.lift_off_z = Some(self.gripper.tool.position.z + LIFT_OFF_M);
+        Ok(())
+    }
+
+    fn miss(&mut self) -> Result<(), Cause> {
+        self.open();
+        Err(Cause::MissedGrasp)
+    }
+
+    fn release(&mut self) -> Result<(), Cause> {
+        let gap_m = match drop_spot::container_below(&self.scene, &self.world, &self.gripper.tool) {
+            None => SET_DOWN_M,
+            Some(container) => {
+                let spot = drop_spot::choose(&self.scene, &self.world, &self.gripper, container);
+                let way = spot - self.gripper.tool.position;
+                let free_m = self.gripper.free_way_m(&self.world, &self.gripper.tool, way, AtStart::MayLeave);
+                if free_m >= way.length() {
+                    self.follow(Tool { position: spot, ..self.gripper.tool }, |_| Air::Clear);
+                }
+                DROP_M
+            }
+        };
+        self.sink(f32::MIN, gap_m);
+        self.lift_off_z = None;
+        let Some(body) = self.gripper.let_go(&mut self.world) else {
+            return Err(Cause::DroppedObject);
+        };
+        let opening =
+            Motion::new(self.gripper.tool, Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, &self.config);
+        for step in 1..=opening.n_steps {
+            self.tick(opening.at(step), Air::Unknown);
+        }
+        Gripper::part_from(&mut self.world, body);
+        self.rest()
+    }
+
+    /// Steps until all is at rest.
+    fn rest(&mut self) -> Result<(), Cause> {
+        for step in 0..self.config.settle_limit_steps() {
+            self.tick(self.gripper.tool, Air::Unknown);
+            if self.is_at_rest(step) {
+                return Ok(());
+            }
+        }
+        Err(Cause::TimeLimit)
+    }
+
+    fn open(&mut self) {
+        self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, |_| Air::Unknown);
+    }
+
+    fn close_on_air(&mut self) {
+        self.follow(Tool { opening_m: 0.0, ..self.gripper.tool }, |_| Air::Unknown);
+    }
+
+    /// Closes until both fingers touch the body; whether they do.
+    fn close_on(&mut self, body: BodyIndex) -> bool {
+        let most_m = CLOSE_M_PER_S / self.config.step_hz as f32;
+        loop {
+            let gaps = self.gripper.finger_gaps_m(&self.world, body);
+            let farther_m = gaps[0].max(gaps[1]);
+            if farther_m <= TOUCH_M {
+                return true;
+            }
+            let tool = self.gripper.tool;
+            let opening_m = tool.opening_m - 2.0 * farther_m.min(most_m);
+            if opening_m <= 0.0 {
+                return false;
+            }
+            self.tick(Tool { opening_m, ..tool }, Air::Unknown);
+        }
+    }
+
+    /// Straight up to a height; not at all when it is higher already.
+    fn rise(&mut self, z: f32) {
+        let tool = self.gripper.tool;
+        let way = Vector::new(0.0, 0.0, z - tool.position.z);
+        if way.z <= 0.0 {
+            return;
+        }
+        let is_free = self.gripper.free_way_m(&self.world, &tool, way, AtStart::MayLeave) >= way.z;
+        let clear_z = if is_free { self.lift_off_z.unwrap_or(f32::MIN) } else { f32::MAX };
+        self.follow(tool.at_height(z), |tool| if tool.position.z >= clear_z { Air::Clear } else { Air::Unknown });
+        self.lift_off_z = None;
+    }
+
+    /// Straight down to a height, or until the gripper or what it holds is `gap_m` above something.
+    fn sink(&mut self, z: f32, gap_m: f32) {
+        let tool = self.gripper.tool;
+        let depth_m = (tool.position.z - z).min(2.0);
+        let free_m = self.gripper.free_way_m(&self.world, &tool, Vector::new(0.0, 0.0, -depth_m), AtStart::Stops);
+        let way_m = if free_m < depth_m { (free_m - gap_m).max(0.0) } else { depth_m };
+        self.follow(tool.at_height(tool.position.z - way_m), |_| Air::Clear);
+    }
+
+    fn follow(&mut self, to: Tool, air: impl Fn(&Tool) -> Air) {
+        let motion = Motion::new(self.gripper.tool, to, &self.config);
+        for step in 1..=motion.n_steps {
+            let tool = motion.at(step);
+            self.tick(tool, air(&tool));
+        }
+    }
+
+    fn body_in_world(&self, body: BodyIndex) -> EnginePose {
+        match self.gripper.flown() {
+            Some((flown, in_world)) if flown == body => in_world,
+            _ => self.world.in_world(body),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! How the gripper turns to a body, and whether it has it.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use rapier3d::math::{Pose as EnginePose, Vector};
+
+use crate::robot::GRASP_M;
+use crate::scene::Shape;
+use crate::sim::gripper::MAX_OPENING_M;
+use crate::sim::motion::{Tool, turn_rad};
+
+/// Fingers must be this much wider open than the body, in metres.
+const FINGER_ROOM_M: f32 = 0.004;
+/// A turn below this is not worth making, in radians.
+const MIN_TURN_RAD: f32 = 0.01;
+/// Extents that differ by less count as equal, in metres.
+const EQUAL_M: f32 = 0.001;
+/// How far from the fingers' middle a body's centre may be, along their flat sides and in height, in metres.
+const MAX_OFFSET_M: f32 = 0.015;
+
+/// The yaw with which the fingers, which close along the gripper's y, meet a body's nearest parallel sides: across
+/// its shorter side, and of equal sides the one that is nearest to the present yaw.
+pub(super) fn yaw_rad(shape: &Shape, in_world: &EnginePose, now_rad: f32) -> f32 {
+    let sides = sides(shape, in_world);
+    let fits = sides.iter().filter(|side| 2.0 * side.half_m + FINGER_ROOM_M <= MAX_OPENING_M);
+    let shortest_m = fits.clone().map(|side| side.half_m).fold(f32::MAX, f32::min);
+    let turn = fits
+        .filter(|side| side.half_m <= shortest_m + EQUAL_M)
+        .map(|side| half_turn_rad(now_rad, side.across.y.atan2(side.across.x) - FRAC_PI_2))
+        .min_by(|a, b| a.abs().total_cmp(&b.abs()));
+    turn.filter(|turn| turn.abs() >= MIN_TURN_RAD).map_or(now_rad, |turn| now_rad + turn)
+}
+
+/// A pair of parallel upright sides.
+struct Side {
+    /// Their normal.
+    across: Vector,
+    /// Half of their distance.
+    half_m: f32,
+}
+
+fn sides(shape: &Shape, in_world: &EnginePose) -> Vec<Side> {
+    let axis = |axis: Vector, half_m: f32| Side { across: in_world.rotation * axis, half_m };
+    match *shape {
+        Shape::Cuboid { half_extents_m: [x, y, z] } => {
+            let mut all = vec![axis(Vector::X, x), axis(Vector::Y, y), axis(Vector::Z, z)];
+            all.sort_by(|a, b| a.across.z.abs().total_cmp(&b.across.z.abs()));
+            all.truncate(2);
+            all
+        }
+        // Upright it is the same from every side; lying, its round side is across its axis.
+        Shape::Cylinder { radius_m, .. } => {
+            let along = in_world.rotation * Vector::Z;
+            let lies = along.z.abs() < 0.5;
+            lies.then(|| Side { across: Vector::new(-along.y, along.x, 0.0), half_m: radius_m }).into_iter().collect()
+        }
+        Shape::Ball { .. } | Shape::OpenBox { .. } => Vec::new(),
+    }
+}
+
+/// The shortest turn to a direction or its opposite.
+fn half_turn_rad(from: f32, to: f32) -> f32 {
+    let turn = turn_rad(from, to);
+    if turn > FRAC_PI_2 {
+        turn - PI
+    } else if turn < -FRAC_PI_2 {
+        turn + PI
+    } else {
+        turn
+    }
+}
+
+/// Whether a body that both fingers touch is well between them.
+pub(super) fn is_between_fingers(tool: &Tool, in_world: &EnginePose) -> bool {
+    let center = tool.in_world().inv_mul(in_world).translation;
+    center.x.abs() <= MAX_OFFSET_M && (center.z + GRASP_M).abs() <= MAX_OFFSET_M
+}
+
+#[cfg(test)]
+mod tests {
+    use rapier3d::math::Rotation;
+
+    use super::*;
+
+    fn turned(yaw_rad: f32) -> EnginePose {
+        EnginePose::from_rotation(Rotation::from_rotation_z(yaw_rad))
+    }
+
+    #[track_caller]
+    fn check(half_extents_m: [f32; 3], body_yaw_rad: f32, expected_rad: f32) {
+        let found = yaw_rad(&Shape::Cuboid { half_extents_m }, &turned(body_yaw_rad), 0.0);
+        assert!((found - expected_rad).abs() < 1e-3, "{found} instead of {expected_rad}");
+    }
+
+    #[test]
+    fn a_cube_is_met_at_its_nearest_sides() {
+        check([0.025; 3], 0.3, 0.3);
+        check([0.025; 3], 1.5, 1.5 - FRAC_PI_2);
+        check([0.025; 3], -1.0, FRAC_PI_2 - 1.0);
+    }
+
+    #[test]
+    fn a_brick_is_met_across_its_shorter_side() {
+        check([0.028, 0.015, 0.015], 0.3, 0.3);
+        check([0.015, 0.028, 0.015], 0.3, 0.3 - FRAC_PI_2);
+        check([0.025, 0.06, 0.015], 0.0, FRAC_PI_2);
+    }
+}

@@ -1,0 +1,217 @@
+//! The free-flying gripper: a palm and two fingers that follow a [`Tool`], and what they hold.
+//!
+//! The actions speak of a tool (a place, a turn, an opening) alone and only this file knows the colliders behind it:
+//! an arm takes the gripper's place by offering the same methods.
+//!
+//! # Free flight
+//!
+//! While everything but the held body sleeps and the way is known to be clear, nothing can happen but the rigid
+//! motion of the gripper and of what is fixed to it. That motion is computed directly and the engine is not stepped;
+//! the engine's gripper catches up before the next step. The simulated time is the same either way.
+
+use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::geometry::{ColliderBuilder, Group, SharedShape};
+use rapier3d::math::{Pose as EnginePose, Vector};
+
+use crate::scene::BodyIndex;
+use crate::sim::motion::Tool;
+use crate::sim::sweep::AtStart;
+use crate::sim::world::{GRIPPER_GROUP, SCENE_GROUP, World, groups};
+
+/// The widest opening, in metres.
+pub(super) const MAX_OPENING_M: f32 = 0.07;
+/// From the gripper's reference point down to the finger tips, in metres.
+pub(super) const TIP_M: f32 = 0.028;
+/// From the gripper's reference point up to the palm's lower side, in metres.
+const PALM_M: f32 = 0.015;
+/// Half of a finger's extents, in metres: narrow enough for neighbours 7 cm apart.
+const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, (TIP_M + PALM_M) / 2.0];
+const PALM_HALF_M: [f32; 3] = [0.013, 0.044, 0.008];
+const FINGER_FRICTION: f32 = 0.6;
+/// From the gripper's axis to a fully open finger's outer side, in metres.
+pub(super) const OPEN_REACH_M: f32 = MAX_OPENING_M / 2.0 + 2.0 * FINGER_HALF_M[1];
+/// Half of the palm's width along the fingers' flat side, in metres.
+pub(super) const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
+/// How far a held body may shift before it counts as lost, in metres.
+const SLIP_M: f32 = 0.005;
+
+/// A body in the grasp.
+#[derive(Clone, Copy)]
+pub(super) struct Held {
+    pub(super) body: BodyIndex,
+    pub(super) handle: RigidBodyHandle,
+    pub(super) in_gripper: EnginePose,
+    joint: ImpulseJointHandle,
+}
+
+/// Whether the engine's gripper is where the tool is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Engine {
+    Current,
+    Behind,
+}
+
+/// Palm, fingers, and what they hold.
+pub(super) struct Gripper {
+    pub(super) tool: Tool,
+    pub(super) held: Option<Held>,
+    palm: RigidBodyHandle,
+    fingers: [RigidBodyHandle; 2],
+    engine: Engine,
+}
+
+/// The two sides that the fingers are on.
+const SIDES: [f32; 2] = [1.0, -1.0];
+
+impl Gripper {
+    pub(super) fn new(world: &mut World, tool: Tool) -> Self {
+        let mut insert = |half: [f32; 3], in_world: EnginePose| {
+            let collider = ColliderBuilder::cuboid(half[0], half[1], half[2])
+                .friction(FINGER_FRICTION)
+                .collision_groups(groups(GRIPPER_GROUP, SCENE_GROUP));
+            world.engine.insert(RigidBodyBuilder::kinematic_position_based().pose(in_world), collider).0
+        };
+        let palm = insert(PALM_HALF_M, palm_in_world(&tool));
+        let fingers = SIDES.map(|side| insert(FINGER_HALF_M, finger_in_world(&tool, side)));
+        Self { tool, held: None, palm, fingers, engine: Engine::Current }
+    }
+
+    /// Moves in free flight; see the module.
+    pub(super) fn fly(&mut self, tool: Tool) {
+        self.tool = tool;
+        self.engine = Engine::Behind;
+    }
+
+    /// Asks the engine to move the gripper in its next step.
+    pub(super) fn drive(&mut self, world: &mut World, tool: Tool) {
+        self.catch_up(world);
+        self.tool = tool;
+        let [left, right] = SIDES.map(|side| finger_in_world(&tool, side));
+        let targets = [(self.palm, palm_in_world(&tool)), (self.fingers[0], left), (self.fingers[1], right)];
+        for (handle, in_world) in targets {
+            world.engine.bodies[handle].set_next_kinematic_position(in_world);
+        }
+    }
+
+    /// Brings the engine's gripper, and what it holds, to where they flew.
+    pub(super) fn catch_up(&mut self, world: &mut World) {
+        if self.engine == Engine::Current {
+            return;
+        }
+        self.engine = Engine::Current;
+        let bodies = &mut world.engine.bodies;
+        bodies[self.palm].set_position(palm_in_world(&self.tool), false);
+        for (handle, side) in self.fingers.into_iter().zip(SIDES) {
+            bodies[handle].set_position(finger_in_world(&self.tool, side), false);
+        }
+        if let Some(held) = self.held {
+            let body = &mut bodies[held.handle];
+            body.set_position(self.tool.in_world() * held.in_gripper, true);
+            body.set_linvel(Vector::ZERO, true);
+            body.set_angvel(Vector::ZERO, true);
+        }
+    }
+
+    /// Where the held body is, if the engine does not know it.
+    pub(super) fn flown(&self) -> Option<(BodyIndex, EnginePose)> {
+        let held = self.held.filter(|_| self.engine == Engine::Behind)?;
+        Some((held.body, self.tool.in_world() * held.in_gripper))
+    }
+
+    /// Height of the lowest point of gripper and load.
+    pub(super) fn lowest_z(&self, world: &World) -> f32 {
+        let tips_z = self.tool.position.z - TIP_M;
+        self.carried(world, &self.tool).map_or(tips_z, |(shape, pose)| tips_z.min(shape.compute_aabb(&pose).mins.z))
+    }
+
+    /// What is held as it would be with the gripper at `tool`.
+    pub(super) fn carried(&self, world: &World, tool: &Tool) -> Option<(SharedShape, EnginePose)> {
+        let held = self.held?;
+        let collider = &world.engine.colliders[world.collider(held.body)];
+        let in_body = collider.position_wrt_parent().copied().unwrap_or(EnginePose::IDENTITY);
+        Some((collider.shared_shape().clone(), tool.in_world() * held.in_gripper * in_body))
+    }
+
+    pub(super) fn held_handle(&self) -> Option<RigidBodyHandle> {
+        self.held.map(|held| held.handle)
+    }
+
+    /// Fixes a body to the palm as they are now. Contacts between the two end: the joint does the fingers' work.
+    pub(super) fn hold(&mut self, world: &mut World, body: BodyIndex) {
+        self.catch_up(world);
+        let handle = world.handle(body);
+        let in_palm = palm_in_world(&self.tool).inv_mul(&world.in_world(body));
+        let joint = FixedJointBuilder::new().local_frame1(in_palm).contacts_enabled(false);
+        let joint = world.engine.insert_impulse_joint(self.palm, handle, joint);
+        let collider = world.collider(body);
+        world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, SCENE_GROUP));
+        let in_gripper = self.tool.in_world().inv_mul(&world.in_world(body));
+        self.held = Some(Held { body, handle, in_gripper, joint });
+    }
+
+    /// Lets go. The body does not touch the gripper until [`Gripper::part_from`].
+    pub(super) fn let_go(&mut self, world: &mut World) -> Option<BodyIndex> {
+        self.catch_up(world);
+        let held = self.held.take()?;
+        world.engine.remove_impulse_joint(held.joint);
+        world.engine.wake_up(held.handle, true);
+        Some(held.body)
+    }
+
+    /// Lets a body that was let go collide with the gripper again.
+    pub(super) fn part_from(world: &mut World, body: BodyIndex) {
+        let collider = world.collider(body);
+        world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, Group::ALL));
+    }
+
+    /// Whether what was held has shifted in the grasp.
+    pub(super) fn has_slipped(&self, world: &World) -> bool {
+        self.held.is_some_and(|held| {
+            let now = self.tool.in_world().inv_mul(&world.in_world(held.body));
+            (now.translation - held.in_gripper.translation).length() > SLIP_M
+        })
+    }
+
+    /// Distance from each finger to a body, in metres; 0 when they touch.
+    pub(super) fn finger_gaps_m(&self, world: &World, body: BodyIndex) -> [f32; 2] {
+        let [x, y, z] = FINGER_HALF_M;
+        let finger = rapier3d::parry::shape::Cuboid::new(Vector::new(x, y, z));
+        let target = &world.engine.colliders[world.collider(body)];
+        SIDES.map(|side| {
+            let pose = finger_in_world(&self.tool, side);
+            let found = rapier3d::parry::query::distance(&pose, &finger, target.position(), target.shape());
+            found.map_or(f32::MAX, |found| found.distance)
+        })
+    }
+
+    /// How far the gripper, with what it holds, can move along `path` before it meets something; its whole length
+    /// when it meets nothing.
+    pub(super) fn free_way_m(&self, world: &World, tool: &Tool, path: Vector, at_start: AtStart) -> f32 {
+        let held = self.held_handle();
+        let parts = hull(tool).into_iter().chain(self.carried(world, tool));
+        parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
+    }
+}
+
+fn palm_in_world(tool: &Tool) -> EnginePose {
+    tool.in_world() * EnginePose::translation(0.0, 0.0, PALM_M + PALM_HALF_M[2])
+}
+
+fn finger_in_world(tool: &Tool, side: f32) -> EnginePose {
+    let y = side * (tool.opening_m / 2.0 + FINGER_HALF_M[1]);
+    tool.in_world() * EnginePose::translation(0.0, y, (PALM_M - TIP_M) / 2.0)
+}
+
+/// The gripper's parts as they are swept by opening the fingers all the way: what is clear of these stays clear of
+/// the fingers when they open.
+pub(super) fn hull(tool: &Tool) -> [(SharedShape, EnginePose); 3] {
+    let [x, thickness, z] = FINGER_HALF_M;
+    let inner = tool.opening_m.min(MAX_OPENING_M) / 2.0;
+    let outer = (MAX_OPENING_M.max(tool.opening_m)) / 2.0 + 2.0 * thickness;
+    let finger = |side: f32| {
+        let pose = EnginePose::translation(0.0, side * (inner + outer) / 2.0, (PALM_M - TIP_M) / 2.0);
+        (SharedShape::cuboid(x, (outer - inner) / 2.0, z), tool.in_world() * pose)
+    };
+    let [palm_x, palm_y, palm_z] = PALM_HALF_M;
+    [(SharedShape::cuboid(palm_x, palm_y, palm_z), palm_in_world(tool)), finger(1.0), finger(-1.0)]
+}

@@ -1,0 +1,227 @@
+//! Mini-batches: drawn examples, augmented, as the numbers that networks read and losses compare with.
+//!
+//! # Shapes
+//!
+//! Targets are dense: one-hot labels, already divided by how many labels the whole mini-batch has, so that a loss is
+//! a plain sum and the parts of a split mini-batch add up.
+
+use rand::Rng;
+use rand::seq::SliceRandom as _;
+
+use crate::model::Windows;
+use crate::program::Program;
+use crate::robot::{GRASP_M, HOVER_M};
+use crate::scene::SlotIndex;
+use crate::seed::Seed;
+use crate::task::Family;
+use crate::trace::{Observation, ScopingLabel};
+use crate::training::config::TrainConfig;
+use crate::training::examples::{Example, Examples};
+
+/// Frames in a mini-batch from which on it is split in two parts of about the same length of windows: less padding,
+/// and a part for each of two cores. A fixed number, since the sum of gradients must not depend on the machine.
+const SPLIT_FRAMES: usize = 192;
+
+/// How far a jittered gripper is moved, in x, y and z, in metres.
+const JITTER_M: [f32; 3] = [0.25, 0.25, 0.1];
+
+/// A part of a mini-batch, all of one running program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Which of [`Examples::levels`].
+    pub level_idx: usize,
+    /// The running program.
+    pub program: Program,
+    /// What it sees of the demonstrations.
+    pub windows: Windows,
+    /// What is seen now, an observation row each.
+    pub states: Vec<f32>,
+    /// `[B, programs]`
+    pub programs: Vec<f32>,
+    /// One where the program ends, `[B]`.
+    pub ends: Vec<f32>,
+    /// Weight of each example for program and end: one over the mini-batch's size.
+    pub weight: f32,
+    /// `[B, T, 4]`; nothing without labels.
+    pub scopes: Option<Vec<f32>>,
+    /// `[B, N]`; nothing without labels.
+    pub arguments: Option<Vec<f32>>,
+}
+
+/// One example with its own copies of what augmentations change.
+struct Prepared {
+    example: Example,
+    window: Vec<f32>,
+    state: Vec<f32>,
+    argument: Option<usize>,
+}
+
+/// Draws a mini-batch of a level. It depends on nothing but its arguments.
+pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, size: usize, seed: Seed) -> Vec<Part> {
+    let mut rng = seed.rng();
+    let mut drawn: Vec<Prepared> = (0..size)
+        .map(|_| {
+            let example = examples.draw(level_idx, config.pairing, &mut rng);
+            prepare(examples, config, example, &mut rng)
+        })
+        .collect();
+    drawn.sort_by_key(|prepared| prepared.example.window.len());
+    let n_frames: usize = drawn.iter().map(|prepared| prepared.example.window.len()).sum();
+    let middle = if n_frames > SPLIT_FRAMES { balanced(&drawn, n_frames) } else { drawn.len() };
+    let counts = Counts::of(&drawn);
+    let (short, long) = drawn.split_at(middle);
+    let parts = [long, short].into_iter().filter(|part| !part.is_empty());
+    parts.map(|part| assemble(examples, level_idx, part, counts)).collect()
+}
+
+/// Where to split windows that are sorted by length so that both parts have about as many frames.
+fn balanced(drawn: &[Prepared], n_frames: usize) -> usize {
+    let mut before = 0;
+    let lengths = drawn.iter().map(|prepared| prepared.example.window.len());
+    let short = lengths.take_while(|length| {
+        before += length;
+        2 * before <= n_frames
+    });
+    short.count()
+}
+
+/// How many labels a mini-batch has.
+#[derive(Clone, Copy)]
+struct Counts {
+    examples: usize,
+    scoped_frames: usize,
+    arguments: usize,
+}
+
+impl Counts {
+    fn of(drawn: &[Prepared]) -> Self {
+        let scoped = drawn.iter().filter(|prepared| prepared.example.scope.is_some());
+        Self {
+            examples: drawn.len(),
+            scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
+            arguments: drawn.iter().filter(|prepared| prepared.argument.is_some()).count(),
+        }
+    }
+}
+
+fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Prepared {
+    let data = examples.data();
+    let width = Observation::width(data.n_slots);
+    let rows = &data.trials[example.demonstration].observations;
+    let mut window = rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec();
+    let family = data.trials[example.trial].family;
+    let mut state = data.trials[example.trial].observations[example.frame * width..][..width].to_vec();
+    let mut argument = example.argument.map(|slot| usize::from(slot.0));
+    // The number of draws does not depend on the outcome of one: an augmentation switched off changes no other.
+    let (relabelled, jittered) = (rng.random::<f32>(), rng.random::<f32>());
+    let (permutation, place) = (permutation(family, data.n_slots, rng), Place::draw(data.n_slots, rng));
+    if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(&example, &state) {
+        place.put_gripper(&mut state, example.next_move);
+    }
+    if relabelled < config.relabel_slots.unwrap_or_default() {
+        window.chunks_exact_mut(width).for_each(|row| relabel(row, &permutation));
+        relabel(&mut state, &permutation);
+        argument = argument.and_then(|slot| permutation.iter().position(|&shown| shown == slot));
+    }
+    Prepared { example, window, state, argument }
+}
+
+/// Which slot each label shows: any order of blocks; categories and containers among themselves.
+fn permutation(family: Family, n_slots: usize, rng: &mut impl Rng) -> Vec<usize> {
+    let mut slots: Vec<usize> = (0..n_slots).collect();
+    match family {
+        Family::BlockStacking => slots.shuffle(rng),
+        Family::ObjectSorting => slots.chunks_mut(n_slots.div_ceil(2).max(1)).for_each(|kind| kind.shuffle(rng)),
+    }
+    slots
+}
+
+fn relabel(row: &mut [f32], permutation: &[usize]) {
+    let shown = row.to_vec();
+    for (positions, &slot) in row.chunks_exact_mut(3).zip(permutation) {
+        positions.copy_from_slice(&shown[3 * slot..3 * slot + 3]);
+    }
+}
+
+/// Whether the decision stays right wherever the gripper is: it is empty, and the next primitive moves it (or none
+/// comes).
+fn may_jitter(example: &Example, state: &[f32]) -> bool {
+    let open = state[state.len() - 2] > 0.5;
+    open && (example.next_move.is_some() || example.last_decision)
+}
+
+/// Where a jittered gripper is put.
+enum Place {
+    /// So far from where it was.
+    Offset([f32; 3]),
+    /// So high above what a slot shows.
+    Above { slot: usize, height_m: f32 },
+}
+
+impl Place {
+    fn draw(n_slots: usize, rng: &mut impl Rng) -> Self {
+        if rng.random::<bool>() {
+            return Self::Offset(JITTER_M.map(|reach| rng.random_range(-reach..reach)));
+        }
+        let height_m = if rng.random::<bool>() { HOVER_M } else { GRASP_M };
+        Self::Above { slot: rng.random_range(0..n_slots), height_m }
+    }
+
+    /// Positions are relative to the gripper: moving it moves everything else. It is never put above what it shall
+    /// move to next, since there the move would be done.
+    fn put_gripper(&self, state: &mut [f32], next_move: Option<SlotIndex>) {
+        let offset = match *self {
+            Self::Offset(offset) => offset,
+            Self::Above { slot, .. } if next_move.is_some_and(|next| usize::from(next.0) == slot) => return,
+            Self::Above { slot, height_m } => [state[3 * slot], state[3 * slot + 1], state[3 * slot + 2] + height_m],
+        };
+        let n_coordinates = state.len() - 2;
+        for position in state[..n_coordinates].chunks_exact_mut(3) {
+            position.iter_mut().zip(offset).for_each(|(coordinate, offset)| *coordinate -= offset);
+        }
+    }
+}
+
+fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts: Counts) -> Part {
+    let n_slots = examples.data().n_slots;
+    let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
+    let windows = Windows::new(n_slots, &slices);
+    let weight = 1.0 / counts.examples as f32;
+    let one_hot = |width: usize, hot: Option<usize>, value: f32| {
+        (0..width).map(move |column| if Some(column) == hot { value } else { 0.0 })
+    };
+    let programs = part
+        .iter()
+        .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
+        .collect();
+    let arguments = part.iter().any(|prepared| prepared.argument.is_some()).then(|| {
+        let value = 1.0 / counts.arguments as f32;
+        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.argument, value)).collect()
+    });
+    let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
+    let scopes = scoped.then(|| scope_targets(part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
+    Part {
+        level_idx,
+        program: examples.levels().nth(level_idx).map_or(Program::None, |(program, _)| program),
+        windows,
+        states: part.iter().flat_map(|prepared| &prepared.state).copied().collect(),
+        programs,
+        ends: part.iter().map(|prepared| f32::from(u8::from(prepared.example.end_of_program))).collect(),
+        weight,
+        scopes,
+        arguments,
+    }
+}
+
+/// `[B, T, 4]`, zero where a frame has no label.
+fn scope_targets(part: &[Prepared], n_frames: usize, value: f32) -> Vec<f32> {
+    let n_labels = ScopingLabel::ALL.len();
+    let mut targets = vec![0.0; part.len() * n_frames * n_labels];
+    for (prepared, frames) in part.iter().zip(targets.chunks_exact_mut((n_frames * n_labels).max(1))) {
+        let Some(scope) = prepared.example.scope else { continue };
+        for (frame, labels) in frames.chunks_exact_mut(n_labels).take(prepared.example.window.len()).enumerate() {
+            labels[scope.label(frame as u32) as usize] = value;
+        }
+    }
+    targets
+}

@@ -1,0 +1,189 @@
+//! The settings of one training, as they stand in a pipeline file.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::model::Variant;
+use crate::training::TrainError;
+
+/// How a model is trained: one `[[train]]` table of a pipeline file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrainConfig {
+    /// Name of the model's folder; by default the variant's name.
+    pub name: Option<String>,
+    /// The kind of network.
+    pub variant: Variant,
+    /// Steps of the optimizer.
+    pub steps: u32,
+    /// What parameters, batches and augmentations are drawn from.
+    pub seed: u64,
+    /// Decisions of the root program in a step; programs below it have half as many each.
+    pub batch: u32,
+    /// Highest learning rate; by default 0.003 for object-centric and 0.002 for flattened networks.
+    pub learning_rate: Option<f32>,
+    /// Steps in which the learning rate rises from zero.
+    pub warmup_steps: u32,
+    /// The learning rate at the end of its cosine, as a share of the highest.
+    pub final_learning_rate: f32,
+    /// Largest norm of a step's gradient; a longer one is scaled down to it.
+    pub clip_norm: f32,
+    /// Which trial the demonstration comes from.
+    pub pairing: Pairing,
+    /// How a step is shared out among the levels of the hierarchy.
+    pub curriculum: Curriculum,
+    /// What each decision's parts weigh.
+    pub loss: LossWeights,
+    /// How often slots are relabelled (0 to 1); by default never for object-centric networks, which it changes nothing
+    /// for, and always for flattened ones.
+    pub relabel_slots: Option<f32>,
+    /// How often an empty gripper is put elsewhere before it moves (0 to 1): a policy's gripper may hang where the
+    /// expert's never did. By default 0.2 for object-centric networks and never for flattened ones, which it keeps
+    /// from learning in this budget.
+    pub gripper_jitter: Option<f32>,
+    /// Steps between checkpoints.
+    pub checkpoint_every: u32,
+    /// Steps between rows of the metrics.
+    pub metrics_every: u32,
+}
+
+impl Default for TrainConfig {
+    fn default() -> Self {
+        Self {
+            name: None,
+            variant: Variant::default(),
+            steps: 1000,
+            seed: 0,
+            batch: 32,
+            learning_rate: None,
+            warmup_steps: 100,
+            final_learning_rate: 0.02,
+            clip_norm: 5.0,
+            pairing: Pairing::default(),
+            curriculum: Curriculum::default(),
+            loss: LossWeights::default(),
+            relabel_slots: None,
+            gripper_jitter: None,
+            checkpoint_every: 100,
+            metrics_every: 10,
+        }
+    }
+}
+
+/// Which trial of the task a demonstration comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pairing {
+    /// Another trial than the state: the network must compare, it cannot look positions up.
+    #[default]
+    Cross,
+    /// The same trial.
+    Own,
+}
+
+/// How a step is shared out among the levels of the hierarchy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Curriculum {
+    /// Every level once in each step.
+    #[default]
+    Equal,
+    /// As many mini-batches as there are levels, drawn in proportion to the levels' errors (the paper's).
+    Adaptive,
+}
+
+/// What the parts of a decision weigh in the loss.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LossWeights {
+    /// Cross-entropy of the next program.
+    pub program: f32,
+    /// Binary cross-entropy of the end of the running program.
+    pub end: f32,
+    /// Mean cross-entropy of the frames' scoping labels.
+    pub scope: f32,
+    /// Cross-entropy of the argument.
+    pub argument: f32,
+}
+
+impl Default for LossWeights {
+    fn default() -> Self {
+        Self { program: 1.0, end: 1.0, scope: 5.0, argument: 1.0 }
+    }
+}
+
+impl TrainConfig {
+    /// The name of the model's folder.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or_else(|| self.variant.name())
+    }
+
+    /// With every default that depends on the variant filled in.
+    #[must_use]
+    pub fn resolved(&self) -> Self {
+        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
+            Variant::Ntp => (0.003, 0.0, 0.2),
+            Variant::NtpPaper => (0.002, 1.0, 0.0),
+        };
+        Self {
+            name: Some(self.name().to_owned()),
+            learning_rate: self.learning_rate.or(Some(learning_rate)),
+            relabel_slots: self.relabel_slots.or(Some(relabel_slots)),
+            gripper_jitter: self.gripper_jitter.or(Some(gripper_jitter)),
+            ..self.clone()
+        }
+    }
+
+    /// Whether the settings make sense.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::Config`] for the first that does not, with what is allowed.
+    pub fn check(&self) -> Result<(), TrainError> {
+        let Self { name: _, variant: _, seed: _, pairing: _, curriculum: _, loss, .. } = self;
+        let at_least_one = [
+            ("steps", self.steps),
+            ("batch", self.batch),
+            ("checkpoint_every", self.checkpoint_every),
+            ("metrics_every", self.metrics_every),
+        ];
+        let positive = [("learning_rate", self.learning_rate.unwrap_or(1.0)), ("clip_norm", self.clip_norm)];
+        let shares = [
+            ("final_learning_rate", self.final_learning_rate),
+            ("relabel_slots", self.relabel_slots.unwrap_or(0.0)),
+            ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
+        ];
+        let weights = [
+            ("loss.program", loss.program),
+            ("loss.end", loss.end),
+            ("loss.scope", loss.scope),
+            ("loss.argument", loss.argument),
+        ];
+        let refuse =
+            |key: &'static str, found: String, allowed: &'static str| TrainError::Config { key, found, allowed };
+        let counts = at_least_one.into_iter().filter(|(_, value)| *value == 0);
+        let mut wrong = counts.map(|(key, value)| refuse(key, value.to_string(), "at least 1"));
+        if let Some(error) = wrong.next() {
+            return Err(error);
+        }
+        let numbers = (positive.into_iter().map(|(key, value)| (key, value, value > 0.0, "greater than 0")))
+            .chain(shares.map(|(key, value)| (key, value, (0.0..=1.0).contains(&value), "from 0 to 1")))
+            .chain(weights.map(|(key, value)| (key, value, value >= 0.0, "at least 0")));
+        match numbers.into_iter().find(|(_, value, fits, _)| !fits || !value.is_finite()) {
+            Some((key, value, _, allowed)) => Err(refuse(key, value.to_string(), allowed)),
+            None => Ok(()),
+        }
+    }
+
+    /// The learning rate of a step: a straight rise, then a cosine.
+    pub fn learning_rate_at(&self, step: u32) -> f64 {
+        let highest = f64::from(self.resolved().learning_rate.unwrap_or_default());
+        if step < self.warmup_steps {
+            return highest * f64::from(step + 1) / f64::from(self.warmup_steps);
+        }
+        let span = self.steps.saturating_sub(self.warmup_steps).max(1);
+        let done = f64::from(step - self.warmup_steps) / f64::from(span);
+        let last = f64::from(self.final_learning_rate);
+        highest * (last + (1.0 - last) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos()))
+    }
+}

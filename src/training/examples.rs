@@ -1,0 +1,245 @@
+//! Decisions to learn from: a state of one trial, with the window of another trial's demonstration beside it.
+//!
+//! # Input and output
+//!
+//! [`DatasetTrials`] → [`Example`]: inputs are the running program, its window of demonstration A and an observation
+//! of trial B; labels are what B's expert called there, with spans in A.
+//!
+//! # Invariants
+//!
+//! Training tasks alone. Sub-tasks of A and B are matched by what they do (the arguments of the moves below them) and
+//! not by their number, since A and B may differ in how many objects there are. Of several alike in A the first is
+//! meant: which of them is a function of the state, the k-th is not. Below a sub-task, calls are matched by step.
+
+use std::collections::BTreeMap;
+
+use rand::Rng;
+
+use crate::dataset::{DatasetTrials, TrialData};
+use crate::program::Program;
+use crate::scene::SlotIndex;
+use crate::task::Split;
+use crate::trace::{Observation, ProgramCall, Span};
+use crate::training::{Pairing, TrainError};
+
+/// One decision of an expert.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Example {
+    /// Position of A among the dataset's trials.
+    pub demonstration: usize,
+    /// What the running program sees of A.
+    pub window: Span,
+    /// Position of B among the dataset's trials.
+    pub trial: usize,
+    /// The frame of B at which the decision was made.
+    pub frame: usize,
+    /// What was called.
+    pub callee: Program,
+    /// Whether the running program ended with it.
+    pub end_of_program: bool,
+    /// The callee's part, counted from the window's first frame; `None` for what is not learned (primitives, `none`).
+    pub scope: Option<Span>,
+    /// The callee's argument.
+    pub argument: Option<SlotIndex>,
+    /// What the next primitive is called with; `None` where it is not a `move_to`.
+    pub next_move: Option<SlotIndex>,
+    /// Whether a primitive comes at all, at this decision or later.
+    pub last_decision: bool,
+}
+
+/// The trials of a dataset, indexed for drawing.
+#[derive(Debug)]
+pub struct Examples<'d> {
+    data: &'d DatasetTrials,
+    trees: Vec<CallTree>,
+    /// Positions of the training trials, by task.
+    tasks: Vec<Vec<usize>>,
+    levels: Vec<Level>,
+}
+
+/// The decisions of one running program.
+#[derive(Debug)]
+struct Level {
+    program: Program,
+    is_root: bool,
+    /// Tasks in which it runs.
+    tasks: Vec<usize>,
+}
+
+/// A trial's calls by caller.
+#[derive(Debug)]
+struct CallTree {
+    callees: Vec<Vec<usize>>,
+    /// Arguments of the moves below each callee of the root.
+    signatures: BTreeMap<usize, Vec<SlotIndex>>,
+    /// Calls by the program that decided on them.
+    decisions: BTreeMap<Program, Vec<usize>>,
+}
+
+impl<'d> Examples<'d> {
+    /// Indexes a dataset.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::NoTrials`] without a training trial; [`TrainError::Trial`] when one does not fit together.
+    pub fn new(data: &'d DatasetTrials) -> Result<Self, TrainError> {
+        let mut by_task: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+        let mut trees = Vec::new();
+        for (position, trial) in data.trials.iter().enumerate() {
+            trees.push(CallTree::new(trial, data.n_slots)?);
+            if trial.split == Split::Seen {
+                by_task.entry(&trial.task_id).or_default().push(position);
+            }
+        }
+        let tasks: Vec<Vec<usize>> = by_task.into_values().collect();
+        if tasks.is_empty() {
+            return Err(TrainError::NoTrials { total: data.trials.len() });
+        }
+        let mut levels: BTreeMap<Program, Level> = BTreeMap::new();
+        for (task, trials) in tasks.iter().enumerate() {
+            for &trial in trials {
+                let root = data.trials[trial].calls[0].program;
+                for &program in trees[trial].decisions.keys() {
+                    let is_root = program == root;
+                    let level = levels.entry(program).or_insert(Level { program, is_root, tasks: Vec::new() });
+                    if level.tasks.last() != Some(&task) {
+                        level.tasks.push(task);
+                    }
+                }
+            }
+        }
+        Ok(Self { data, trees, tasks, levels: levels.into_values().collect() })
+    }
+
+    /// The programs that decide, in the order of the program memory, and whether each is a root.
+    pub fn levels(&self) -> impl Iterator<Item = (Program, bool)> {
+        self.levels.iter().map(|level| (level.program, level.is_root))
+    }
+
+    /// The dataset behind.
+    pub fn data(&self) -> &'d DatasetTrials {
+        self.data
+    }
+
+    /// Draws a decision of a level: a task, a trial of it, a decision in it, and the demonstration beside it.
+    pub fn draw(&self, level_idx: usize, pairing: Pairing, rng: &mut impl Rng) -> Example {
+        let level = &self.levels[level_idx];
+        loop {
+            let trials = &self.tasks[level.tasks[rng.random_range(0..level.tasks.len())]];
+            let own = rng.random_range(0..trials.len());
+            let Some(decisions) = self.trees[trials[own]].decisions.get(&level.program) else { continue };
+            let call = decisions[rng.random_range(0..decisions.len())];
+            let other = match pairing {
+                Pairing::Cross if trials.len() > 1 => (own + rng.random_range(1..trials.len())) % trials.len(),
+                Pairing::Cross | Pairing::Own => own,
+            };
+            // Without such a sub-task in the demonstration (a count of zero), the trial's own has it.
+            let paired = self.example(trials[own], call, trials[other]);
+            if let Some(example) = paired.or_else(|| self.example(trials[own], call, trials[own])) {
+                return example;
+            }
+        }
+    }
+
+    /// The decision behind a call of a trial, with another trial's demonstration; nothing when that one has no part
+    /// like it.
+    pub fn example(&self, trial: usize, call: usize, demonstration: usize) -> Option<Example> {
+        let calls = &self.data.trials[trial].calls;
+        let decided = calls.get(call)?;
+        let caller = self.matching(trial, decided.caller?.0 as usize, demonstration)?;
+        let demonstrated = &self.data.trials[demonstration].calls;
+        let window = demonstrated[caller].output?;
+        let scope = if decided.program.is_composite() {
+            let part = demonstrated[self.matching(trial, call, demonstration)?].output?;
+            Some(Span { begin: part.begin - window.begin, end: part.end - window.begin })
+        } else {
+            None
+        };
+        let next = calls[call..].iter().find(|call| call.program.is_primitive());
+        Some(Example {
+            demonstration,
+            window,
+            trial,
+            frame: decided.frames.begin as usize,
+            callee: decided.program,
+            end_of_program: decided.end_of_program,
+            scope,
+            argument: decided.argument,
+            next_move: next.filter(|call| call.program == Program::MoveTo).and_then(|call| call.argument),
+            last_decision: next.is_none(),
+        })
+    }
+
+    /// The call of `other` that does what a call of `trial` does.
+    fn matching(&self, trial: usize, call: usize, other: usize) -> Option<usize> {
+        let calls = &self.data.trials[trial].calls;
+        let Some(caller) = calls[call].caller else { return Some(0) };
+        let (tree, program) = (&self.trees[other], calls[call].program);
+        let candidates = &self.data.trials[other].calls;
+        if caller.0 == 0 {
+            let signature = self.trees[trial].signatures.get(&call)?;
+            let mut alike = tree.callees[0].iter().copied().filter(|&other| candidates[other].program == program);
+            return alike.find(|other| tree.signatures.get(other) == Some(signature));
+        }
+        let caller = self.matching(trial, caller.0 as usize, other)?;
+        let found = *tree.callees[caller].get(usize::from(calls[call].step))?;
+        (candidates[found].program == program).then_some(found)
+    }
+}
+
+impl CallTree {
+    fn new(trial: &TrialData, n_slots: usize) -> Result<Self, TrainError> {
+        check(trial, n_slots)?;
+        let calls = &trial.calls;
+        let mut callees = vec![Vec::new(); calls.len()];
+        let mut decisions: BTreeMap<Program, Vec<usize>> = BTreeMap::new();
+        for (position, call) in calls.iter().enumerate() {
+            if let Some(caller) = call.caller {
+                callees[caller.0 as usize].push(position);
+                decisions.entry(calls[caller.0 as usize].program).or_default().push(position);
+            }
+        }
+        let signatures = callees[0].iter().map(|&position| (position, moves_below(calls, position))).collect();
+        Ok(Self { callees, signatures, decisions })
+    }
+}
+
+/// Arguments of the moves below a call. What is below it follows it in the order of calling.
+fn moves_below(calls: &[ProgramCall], position: usize) -> Vec<SlotIndex> {
+    let below = calls[position + 1..].iter().take_while(|call| call.depth > calls[position].depth);
+    below.filter_map(|call| call.argument).collect()
+}
+
+/// What indexing relies on. An [`crate::trace::Episode`] holds it; a table that was tampered with may not.
+fn check(trial: &TrialData, n_slots: usize) -> Result<(), TrainError> {
+    let refuse = |problem: &str| {
+        Err(TrainError::Trial { task: trial.task_id.clone(), trial: trial.trial, problem: problem.to_owned() })
+    };
+    if trial.n_frames == 0 || trial.observations.len() != trial.n_frames * Observation::width(n_slots) {
+        return refuse("observations are not as many as frames and slots ask for");
+    }
+    if trial.calls.first().is_none_or(|root| root.caller.is_some() || root.output.is_none()) {
+        return refuse("the first call is not a root");
+    }
+    for (position, call) in trial.calls.iter().enumerate() {
+        let caller = call.caller.map(|caller| caller.0 as usize);
+        if caller.is_none() != (position == 0) || caller.is_some_and(|caller| caller >= position) {
+            return refuse("a call's caller does not come before it");
+        }
+        if caller.is_some_and(|caller| call.output.is_some_and(|part| !contains(&trial.calls[caller], part))) {
+            return refuse("a call's part lies outside its caller's");
+        }
+        let frames = [Some(call.frames), call.output].into_iter().flatten();
+        if frames.into_iter().any(|span| span.is_empty() || span.end as usize > trial.n_frames) {
+            return refuse("a call's frames lie beyond the episode");
+        }
+        if call.argument.is_some_and(|slot| usize::from(slot.0) >= n_slots) {
+            return refuse("a call's argument is not a slot");
+        }
+    }
+    Ok(())
+}
+
+fn contains(caller: &ProgramCall, part: Span) -> bool {
+    caller.output.is_some_and(|window| window.contains(part))
+}

@@ -1,0 +1,216 @@
+//! One step of the optimizer: losses of the parts, their gradients, Adam.
+//!
+//! # Invariants
+//!
+//! Parts run side by side on the current rayon pool, each on a copy of the parameters with a gradient graph of its
+//! own. Their gradients are summed in the order of the parts, so the pool's size changes nothing.
+
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use burn::tensor::activation::{log_softmax, relu};
+use burn::tensor::{Bytes, Tensor, TensorData};
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+
+use crate::model::Network;
+use crate::program::Program;
+use crate::trace::ScopingLabel;
+use crate::training::batch::Part;
+use crate::training::config::LossWeights;
+
+/// Losses of a part or a mini-batch, before they are weighed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Losses {
+    /// Of the next program.
+    pub program: f32,
+    /// Of the end of the running program.
+    pub end: f32,
+    /// Of the scoping labels; `None` without labels.
+    pub scope: Option<f32>,
+    /// Of the argument; `None` without labels.
+    pub argument: Option<f32>,
+    /// Weighed and summed.
+    pub total: f32,
+}
+
+impl Losses {
+    /// With another part of the same mini-batch.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        let sum = |a: Option<f32>, b: Option<f32>| match (a, b) {
+            (None, None) => None,
+            (a, b) => Some(a.unwrap_or_default() + b.unwrap_or_default()),
+        };
+        Self {
+            program: self.program + other.program,
+            end: self.end + other.end,
+            scope: sum(self.scope, other.scope),
+            argument: sum(self.argument, other.argument),
+            total: self.total + other.total,
+        }
+    }
+}
+
+/// A network with its optimizer.
+pub struct Learner<N> {
+    network: N,
+    optimizer: ModuleOptimizer,
+    weights: LossWeights,
+    clip_norm: f32,
+}
+
+impl<N: Network> Learner<N> {
+    /// Begins with a network on a device with gradients.
+    pub fn new(network: N, weights: LossWeights, clip_norm: f32) -> Self {
+        Self { network, optimizer: AdamConfig::new().with_epsilon(1e-8).init(), weights, clip_norm }
+    }
+
+    /// The network as it is now.
+    pub fn network(&self) -> &N {
+        &self.network
+    }
+
+    /// The same with other parameters.
+    #[must_use]
+    pub fn with_network(self, network: N) -> Self {
+        Self { network, ..self }
+    }
+
+    /// The optimizer's moments, to go on with later.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot be written in burn's format.
+    pub fn optimizer_bytes(&self) -> Result<Bytes, String> {
+        self.optimizer.into_bytes().map_err(|error| error.to_string())
+    }
+
+    /// Goes on with saved moments.
+    ///
+    /// # Errors
+    ///
+    /// When the bytes are no optimizer's.
+    pub fn with_optimizer(self, bytes: Vec<u8>) -> Result<Self, String> {
+        let optimizer = self.optimizer.from_bytes(Bytes::from_bytes_vec(bytes)).map_err(|error| error.to_string())?;
+        Ok(Self { optimizer, ..self })
+    }
+
+    /// Learns from parts; their losses, in the same order.
+    #[must_use]
+    pub fn step(self, parts: &[Part], learning_rate: f64) -> (Self, Vec<Losses>) {
+        let device = self.network.device();
+        let copies: Vec<(N, &Part)> = parts.iter().map(|part| (self.network.clone().fork(&device), part)).collect();
+        let weights = self.weights;
+        let results: Vec<(Losses, Vec<f32>)> =
+            copies.par_iter().map(|(network, part)| gradient(network, part, weights)).collect();
+        let mut sum = vec![0.0_f32; results.first().map_or(0, |(_, gradient)| gradient.len())];
+        for (_, gradient) in &results {
+            sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
+        }
+        clip(&mut sum, self.clip_norm);
+        let gradients = from_flat(&self.network, &sum);
+        let Self { network, mut optimizer, weights, clip_norm } = self;
+        let network = optimizer.step(learning_rate, network, gradients);
+        (Self { network, optimizer, weights, clip_norm }, results.into_iter().map(|(losses, _)| losses).collect())
+    }
+}
+
+/// Scales a gradient down to a norm that it exceeds. One that is not finite is dropped whole.
+fn clip(gradient: &mut [f32], largest_norm: f32) {
+    let norm = gradient.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt() as f32;
+    let scale = if norm.is_finite() { (largest_norm / norm.max(f32::MIN_POSITIVE)).min(1.0) } else { 0.0 };
+    if scale < 1.0 {
+        gradient.iter_mut().for_each(|value| *value = if value.is_finite() { *value * scale } else { 0.0 });
+    }
+}
+
+/// Losses of a part, and their gradient in the order of the network's parameters.
+fn gradient<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Losses, Vec<f32>) {
+    let (losses, total) = losses(network, part, weights);
+    let gradients = GradientsParams::from_grads(total.backward(), network);
+    let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
+    network.visit(&mut flat);
+    (losses, flat.flat)
+}
+
+/// Losses of a part, and the weighed sum to differentiate.
+pub fn losses<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Losses, Tensor<1>) {
+    let device = network.device();
+    let n_batch = part.ends.len();
+    let demonstration = network.demonstration(&part.windows);
+    let reading = network.read(&demonstration, &part.states);
+    let core = network.core(&reading, part.program);
+    let programs = TensorData::new(part.programs.clone(), [n_batch, Program::ALL.len()]);
+    let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
+    let ends = Tensor::from_data(TensorData::new(part.ends.clone(), [n_batch, 1]), &device);
+    let end = binary_cross_entropy(core.end.clone(), ends).mul_scalar(part.weight);
+    let mut total = program.clone().mul_scalar(weights.program) + end.clone().mul_scalar(weights.end);
+    let scope = part.scopes.as_ref().map(|targets| {
+        let shape = [n_batch, part.windows.n_frames(), ScopingLabel::ALL.len()];
+        let targets = Tensor::<3>::from_data(TensorData::new(targets.clone(), shape), &device);
+        cross_entropy(network.scope(&reading, part.program), targets)
+    });
+    let argument = part.arguments.as_ref().map(|targets| {
+        let targets = TensorData::new(targets.clone(), [n_batch, part.windows.n_slots()]);
+        cross_entropy(network.argument(&reading, part.program, &core), Tensor::from_data(targets, &device))
+    });
+    let weighed = [(&scope, weights.scope), (&argument, weights.argument)];
+    for (loss, weight) in weighed.into_iter().filter_map(|(loss, weight)| Some((loss.clone()?, weight))) {
+        total = total + loss.mul_scalar(weight);
+    }
+    let losses = Losses {
+        program: program.into_scalar(),
+        end: end.into_scalar(),
+        scope: scope.map(Tensor::into_scalar),
+        argument: argument.map(Tensor::into_scalar),
+        total: total.clone().into_scalar(),
+    };
+    (losses, total)
+}
+
+/// Summed over everything; targets carry the weights.
+fn cross_entropy<const D: usize>(logits: Tensor<D>, targets: Tensor<D>) -> Tensor<1> {
+    (log_softmax(logits, D - 1) * targets).sum().neg()
+}
+
+/// Summed over the batch, in the form that does not overflow.
+fn binary_cross_entropy(logits: Tensor<2>, targets: Tensor<2>) -> Tensor<1> {
+    let softplus = relu(logits.clone()) + logits.clone().abs().neg().exp().log1p();
+    (softplus - logits * targets).sum()
+}
+
+/// Gradients as one list; zeros for parameters that took no part.
+struct Flattener<'g> {
+    gradients: &'g GradientsParams,
+    flat: Vec<f32>,
+}
+
+impl ModuleVisitor for Flattener<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let gradient = self.gradients.get::<D>(param.id).and_then(|gradient| gradient.into_data().try_into_vec().ok());
+        match gradient {
+            Some(gradient) => self.flat.extend::<Vec<f32>>(gradient),
+            None => self.flat.resize(self.flat.len() + param.shape().num_elements(), 0.0),
+        }
+    }
+}
+
+/// The other way round.
+struct Unflattener<'g> {
+    flat: &'g [f32],
+    gradients: GradientsParams,
+}
+
+impl ModuleVisitor for Unflattener<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let (gradient, rest) = self.flat.split_at(param.shape().num_elements());
+        self.flat = rest;
+        let data = TensorData::new(gradient.to_vec(), param.shape());
+        self.gradients.register(param.id, Tensor::<D>::from_data(data, &param.device().inner()));
+    }
+}
+
+fn from_flat<N: Module>(network: &N, flat: &[f32]) -> GradientsParams {
+    let mut unflattener = Unflattener { flat, gradients: GradientsParams::new() };
+    network.visit(&mut unflattener);
+    unflattener.gradients
+}

@@ -1,0 +1,68 @@
+//! Colours: each program has one, wherever it is shown.
+
+use rerun::Color;
+
+use crate::program::Program;
+use crate::scene::Scene;
+use crate::trace::ProgramCall;
+
+/// Behind the scene.
+pub(super) const SKY: [u8; 3] = [28, 32, 38];
+/// Of the table.
+pub(super) const TABLE: [u8; 3] = [122, 112, 100];
+/// Of the gripper.
+pub(super) const GRIPPER: [u8; 3] = [176, 184, 194];
+/// Of fingers that hold something.
+pub(super) const HOLDING: [u8; 3] = [120, 214, 120];
+/// Of the mark around what `move_to` goes to.
+pub(super) const TARGET: [u8; 3] = [255, 255, 255];
+/// Of what is there but not meant.
+pub(super) const BACKGROUND: [u8; 3] = [58, 64, 72];
+/// Of the probability that a scope starts at a frame.
+pub(super) const START: [u8; 3] = [102, 205, 120];
+/// Of the probability that a scope ends at a frame.
+pub(super) const STOP: [u8; 3] = [240, 98, 98];
+
+/// Opaque.
+pub(super) fn color([red, green, blue]: [u8; 3]) -> Color {
+    Color::from_rgb(red, green, blue)
+}
+
+/// Mixed with black; `share` of the colour is left.
+pub(super) fn dimmed(color: [u8; 3], share: f32) -> Color {
+    let [red, green, blue] = color.map(|part| (f32::from(part) * share) as u8);
+    Color::from_rgb(red, green, blue)
+}
+
+/// The colour of a call: that of its program, or of the body that its argument shows when that is always the same.
+pub(super) fn of_call(scene: &Scene, call: &ProgramCall) -> [u8; 3] {
+    let argument = call.argument.map(|slot| scene.slot(slot));
+    match argument.and_then(|slot| slot.bodies.first()) {
+        Some(&body) => scene.body(body).color,
+        None => of_program(call.program),
+    }
+}
+
+fn of_program(program: Program) -> [u8; 3] {
+    match program {
+        Program::None => [120, 120, 120],
+        Program::BlockStacking | Program::ObjectSorting => [84, 110, 168],
+        Program::PickAndPlace | Program::PickAndDrop => [126, 87, 194],
+        Program::Pick => [38, 150, 140],
+        Program::Place | Program::Drop => [205, 133, 63],
+        Program::MoveTo => [79, 165, 235],
+        Program::Grip => [92, 170, 96],
+        Program::Release => [214, 84, 120],
+    }
+}
+
+/// Depths, told apart in plots.
+pub(super) fn of_depth(depth: u8) -> Color {
+    match depth {
+        0 => color([122, 146, 200]),
+        1 => color([160, 124, 222]),
+        2 => color([64, 190, 176]),
+        3 => color([240, 170, 80]),
+        _ => color([220, 110, 150]),
+    }
+}

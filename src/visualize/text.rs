@@ -1,0 +1,97 @@
+//! Names, recording properties and the page of text beside the scene.
+
+use std::fmt::Write as _;
+
+use rerun::components::{Scalar, Text};
+use rerun::external::re_log_types::EntityPath;
+use rerun::{AnyValues, RecordingInfo, TextDocument};
+use sha2::{Digest as _, Sha256};
+
+use crate::artifact::hex;
+use crate::trace::{Episode, Outcome};
+use crate::visualize::store::Store;
+use crate::visualize::{Replay, VisualizeError, recording_name};
+
+/// The id of a recording: readable, and other for other content.
+pub(super) fn recording_id(replay: &Replay<'_>) -> String {
+    let mut hasher = Sha256::new();
+    for episode in [Some(replay.episode), replay.demonstration].into_iter().flatten() {
+        hash(&mut hasher, episode);
+    }
+    let digest = hex(&hasher.finalize()[..6]);
+    format!("{}-ep-{:06}-{digest}", replay.episode.provenance.task_id, replay.episode.provenance.index)
+}
+
+fn hash(hasher: &mut Sha256, episode: &Episode) {
+    hasher.update(format!("{:?}{:?}{:?}", episode.provenance, episode.outcome, episode.calls));
+    for frame in &episode.frames {
+        hasher.update(frame.time_nanos.to_le_bytes());
+        for pose in frame.state.bodies_in_world.iter().chain([&frame.state.gripper_in_world]) {
+            for number in pose.translation.vector.iter().chain(pose.rotation.coords.iter()) {
+                hasher.update(number.to_le_bytes());
+            }
+        }
+    }
+}
+
+/// Name, provenance and outcome as properties of the recording.
+pub(super) fn put_properties(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {
+    store.put_static(EntityPath::properties(), &RecordingInfo::new().with_name(recording_name(episode)))?;
+    let words = facts(episode)
+        .into_iter()
+        .fold(AnyValues::default(), |values, (name, value)| values.with_component::<Text>(name, [value]));
+    let sizes = words
+        .with_component::<Scalar>("frames", [episode.frames.len() as f64])
+        .with_component::<Scalar>("calls", [episode.calls.len() as f64])
+        .with_component::<Scalar>("duration_secs", [duration_secs(episode)]);
+    store.put_static(EntityPath::properties().join(&EntityPath::from("episode")), &sizes)
+}
+
+/// The page of text.
+pub(super) fn put_document(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {
+    store.put_static("episode", &TextDocument::from_markdown(markdown(episode)))
+}
+
+fn duration_secs(episode: &Episode) -> f64 {
+    episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
+}
+
+fn facts(episode: &Episode) -> Vec<(&'static str, String)> {
+    let provenance = &episode.provenance;
+    vec![
+        ("task", provenance.task_id.clone()),
+        ("text", provenance.task_text.clone()),
+        ("family", provenance.family.name().to_owned()),
+        ("split", provenance.split.name().to_owned()),
+        ("actor", provenance.actor.name().to_owned()),
+        ("outcome", episode.outcome.to_string()),
+        ("trial", provenance.trial.to_string()),
+        ("seed", provenance.seed.to_string()),
+        ("episode", provenance.index.to_string()),
+    ]
+}
+
+fn markdown(episode: &Episode) -> String {
+    let provenance = &episode.provenance;
+    let outcome = match episode.outcome {
+        Outcome::Success => "**success**".to_owned(),
+        Outcome::Failure(cause) => format!("**failure**: {}", cause.name()),
+    };
+    let mut page = format!("# {}\n\n{outcome}, by `{}`\n\n", provenance.task_id, provenance.actor.name());
+    for (index, goal) in provenance.task_text.split(", then ").enumerate() {
+        // Writing to a string cannot fail.
+        let _written = writeln!(page, "{}. {goal}", index + 1);
+    }
+    let _written = write!(
+        page,
+        "\n`{}` task, trial {} of seed `{}`, episode {}\n\n{} frames, {} calls, {:.1} s\n",
+        provenance.split.name(),
+        provenance.trial,
+        provenance.seed,
+        provenance.index,
+        episode.frames.len(),
+        episode.calls.len(),
+        duration_secs(episode)
+    );
+    page
+}

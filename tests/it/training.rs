@@ -1,0 +1,305 @@
+//! Examples, batches, the training loop, and that something is learned.
+
+use std::cell::Cell;
+use std::path::Path;
+
+use ntp::dataset::{DatasetTrials, TrialData};
+use ntp::model::{CONFIG_FILE, Decoder, ModelConfig, Variant, WEIGHTS_FILE};
+use ntp::program::Program;
+use ntp::rollout::{Limits, Start, load_policy, run};
+use ntp::scene::SlotIndex;
+use ntp::seed::Seed;
+use ntp::table::TableSchema;
+use ntp::task::{Family, Split, Task, sample};
+use ntp::trace::{Actor, Episode, Provenance, Span};
+use ntp::training::{
+    Curriculum, Example, Examples, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary, draw,
+    train,
+};
+
+use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
+
+fn trial_data(episode: &Episode) -> TrialData {
+    let frames = episode.boundary_frames().map(|(_, frame)| frame.observation().to_flat());
+    TrialData {
+        task_id: episode.provenance.task_id.clone(),
+        family: episode.provenance.family,
+        split: episode.provenance.split,
+        trial: episode.provenance.trial,
+        n_frames: episode.frames.len(),
+        observations: frames.flatten().collect(),
+        calls: episode.calls.clone(),
+    }
+}
+
+fn demonstrations(tasks: &[Task], n_trials: u32) -> DatasetTrials {
+    let of_task = |task: &Task| -> Vec<TrialData> {
+        (0..n_trials).map(|idx| trial_data(&demonstration(task, &trial(task, idx, 1), 0))).collect()
+    };
+    DatasetTrials { n_slots: 8, trials: tasks.iter().flat_map(of_task).collect() }
+}
+
+fn towers() -> DatasetTrials {
+    demonstrations(&[tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3], Split::Seen)], 3)
+}
+
+fn span(begin: u32, end: u32) -> Span {
+    Span { begin, end }
+}
+
+/// The calls of trial 0 by caller's program, in order.
+fn decisions(data: &DatasetTrials, trial: usize, program: Program) -> Vec<usize> {
+    let calls = &data.trials[trial].calls;
+    let decided_by =
+        |call: &usize| calls[*call].caller.is_some_and(|caller| calls[caller.0 as usize].program == program);
+    (0..calls.len()).filter(decided_by).collect()
+}
+
+#[test]
+fn labels_of_stacking_are_the_demonstrations_spans() {
+    let data = towers();
+    let examples = Examples::new(&data).unwrap();
+    let labels = |program: Program| -> Vec<Example> {
+        decisions(&data, 0, program).into_iter().map(|call| examples.example(0, call, 1).unwrap()).collect()
+    };
+    let root = labels(Program::BlockStacking);
+    assert_eq!(
+        root.iter().map(|example| example.scope).collect::<Vec<_>>(),
+        [Some(span(0, 5)), Some(span(4, 9)), None]
+    );
+    assert_eq!(root.iter().map(|example| example.frame).collect::<Vec<_>>(), [0, 4, 8]);
+    assert_eq!((root[2].callee, root[2].end_of_program, root[2].last_decision), (Program::None, true, true));
+    let second = &labels(Program::PickAndPlace)[2..];
+    assert_eq!((second[0].window, second[0].scope, second[0].end_of_program), (span(4, 9), Some(span(0, 3)), false));
+    assert_eq!((second[1].callee, second[1].scope, second[1].end_of_program), (Program::Place, Some(span(2, 5)), true));
+    let picks = labels(Program::Pick);
+    assert_eq!((picks[0].argument, picks[0].window, picks[0].scope), (Some(SlotIndex(1)), span(0, 3), None));
+    assert_eq!((picks[1].callee, picks[1].argument, picks[1].next_move), (Program::Grip, None, None));
+    assert_eq!(picks[2].next_move, Some(SlotIndex(2)));
+}
+
+#[test]
+fn sub_tasks_are_matched_by_what_they_do_when_counts_differ() {
+    let task = sorting("m", [0, 2, 2, 1], Split::Seen);
+    let episodes = [1, 2].map(|count| trial_data(&demonstration(&task, &trial(&task, count.into(), count), 0)));
+    let data = DatasetTrials { n_slots: 8, trials: episodes.to_vec() };
+    let examples = Examples::new(&data).unwrap();
+    // The second trial brings two of each category; its 4th and 5th sub-task are of the 2nd and 3rd category.
+    let root = decisions(&data, 1, Program::ObjectSorting);
+    let scope =
+        |sub_task: usize, demonstration: usize| examples.example(1, root[sub_task], demonstration).unwrap().scope;
+    assert_eq!([scope(3, 0), scope(4, 0)], [Some(span(4, 9)), Some(span(8, 13))]);
+    assert_eq!([scope(2, 1), scope(3, 1)], [Some(span(8, 13)); 2], "of several alike the first is meant");
+    let call = decisions(&data, 1, Program::Drop)[2 * 3];
+    let drop = examples.example(1, call, 0).unwrap();
+    assert_eq!((drop.window, drop.argument), (span(6, 9), Some(SlotIndex(6))));
+}
+
+#[test]
+fn cross_pairing_takes_another_trial_and_own_pairing_the_same() {
+    let data = towers();
+    let examples = Examples::new(&data).unwrap();
+    let mut rng = Seed(1).rng();
+    for level in 0..examples.levels().count() {
+        for _ in 0..50 {
+            let cross = examples.draw(level, Pairing::Cross, &mut rng);
+            assert_ne!(cross.demonstration, cross.trial);
+            assert_eq!(data.trials[cross.demonstration].task_id, data.trials[cross.trial].task_id);
+            let own = examples.draw(level, Pairing::Own, &mut rng);
+            assert_eq!(own.demonstration, own.trial);
+        }
+    }
+}
+
+#[test]
+fn unseen_tasks_are_never_learned_from() {
+    let mut data = towers();
+    data.trials.extend(demonstrations(&[tower("c", &[6, 7], Split::Unseen)], 2).trials);
+    let examples = Examples::new(&data).unwrap();
+    let mut rng = Seed(1).rng();
+    let drawn = (0..100).map(|_| examples.draw(0, Pairing::Cross, &mut rng));
+    assert!(drawn.into_iter().all(|example| data.trials[example.trial].split == Split::Seen));
+}
+
+#[test]
+fn a_mini_batchs_targets_sum_to_one_over_its_parts() {
+    let data = towers();
+    let examples = Examples::new(&data).unwrap();
+    let config = TrainConfig::default().resolved();
+    for level in 0..examples.levels().count() {
+        let parts = draw(&examples, &config, level, 48, Seed(4));
+        let sum = |values: &dyn Fn(&ntp::training::Part) -> f32| parts.iter().map(values).sum::<f32>();
+        assert!((sum(&|part| part.programs.iter().sum()) - 1.0).abs() < 1e-4);
+        let scopes = sum(&|part| part.scopes.iter().flatten().sum());
+        let arguments = sum(&|part| part.arguments.iter().flatten().sum());
+        let is_leaf = matches!(parts[0].program, Program::Pick | Program::Place);
+        let (expected_scopes, expected_arguments) = if is_leaf { (0.0, 1.0) } else { (1.0, 0.0) };
+        assert!((scopes - expected_scopes).abs() < 1e-4 && (arguments - expected_arguments).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn a_gripper_is_jittered_only_where_the_decision_stays_right() {
+    let data = towers();
+    let examples = Examples::new(&data).unwrap();
+    let always = TrainConfig { gripper_jitter: Some(1.0), ..TrainConfig::default() }.resolved();
+    let never = TrainConfig { gripper_jitter: Some(0.0), ..always.clone() };
+    let states = |config: &TrainConfig, level: usize| -> Vec<Vec<f32>> {
+        let parts = draw(&examples, config, level, 32, Seed(4));
+        parts.iter().flat_map(|part| part.states.chunks(26).map(<[f32]>::to_vec)).collect()
+    };
+    let place = examples.levels().position(|(program, _)| program == Program::Place).unwrap();
+    assert_eq!(states(&always, place), states(&never, place), "a gripper that holds something stays");
+    let root = states(&always, 0).iter().zip(states(&never, 0)).filter(|(a, b)| *a != b).count();
+    assert!(root > 16, "{root} of 32 moved");
+}
+
+/// Trains into a folder, stopping after some steps when asked to.
+fn train_until(
+    config: &TrainConfig,
+    data: &DatasetTrials,
+    folder: &Path,
+    stop: Option<u32>,
+) -> Result<TrainSummary, TrainError> {
+    let done = Cell::new(0);
+    let mut on_progress = |progress: ntp::training::Progress| done.set(progress.step);
+    let should_stop = || stop.is_some_and(|stop| done.get() >= stop);
+    train(config, data, folder, &mut Hooks { on_progress: &mut on_progress, should_stop: &should_stop })
+}
+
+fn weights(config: &TrainConfig, data: &DatasetTrials) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    train_until(config, data, folder.path(), None).unwrap();
+    std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
+}
+
+fn short(variant: Variant) -> TrainConfig {
+    TrainConfig { variant, steps: 6, batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_weights_for_any_number_of_threads() {
+    let data = towers();
+    for variant in Variant::ALL {
+        let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        let on = |n| pool(n).install(|| weights(&short(variant), &data));
+        let one = on(1);
+        assert!(one == on(2) && one == on(3));
+        assert!(one != weights(&TrainConfig { seed: 1, ..short(variant) }, &data));
+    }
+}
+
+#[test]
+fn forty_steps_are_twenty_and_twenty_more() {
+    let data = towers();
+    for curriculum in [Curriculum::Equal, Curriculum::Adaptive] {
+        let config = TrainConfig { steps: 40, batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() };
+        let (straight, resumed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let whole = train_until(&config, &data, straight.path(), None).unwrap();
+        let stopped = train_until(&config, &data, resumed.path(), Some(20)).unwrap_err();
+        assert!(matches!(stopped, TrainError::Stopped { step: 20 }));
+        assert!(!resumed.path().join(CONFIG_FILE).exists());
+        let rest = train_until(&config, &data, resumed.path(), None).unwrap();
+        assert_eq!((rest.resumed_at, rest.steps, rest.examples), (20, 40, whole.examples));
+        for file in [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE] {
+            let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join(file)).unwrap();
+            assert!(read(&straight) == read(&resumed), "{file} differs");
+        }
+        assert!(!resumed.path().join("checkpoint").exists());
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_training_is_not_taken_and_a_broken_one_is_named() {
+    let data = towers();
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig { batch: 8, ..short(Variant::Ntp) };
+    train_until(&config, &data, folder.path(), Some(3)).unwrap_err();
+    let other = TrainConfig { seed: 9, ..config.clone() };
+    let file = folder.path().join("checkpoint/step-00000003.adam");
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
+    let error = train_until(&config, &data, folder.path(), None).unwrap_err();
+    assert!(matches!(&error, TrainError::Checkpoint { path, .. } if *path == file), "{error}");
+    assert_eq!(train_until(&other, &data, folder.path(), None).unwrap().resumed_at, 0);
+}
+
+#[test]
+fn a_models_folder_tells_how_it_was_made() {
+    let data = towers();
+    let folder = tempfile::tempdir().unwrap();
+    let summary = train_until(&short(Variant::Ntp), &data, folder.path(), None).unwrap();
+    let config: ModelConfig = ntp::artifact::read_json(&folder.path().join(CONFIG_FILE)).unwrap();
+    assert_eq!((config.variant, config.family, config.n_slots), (Variant::Ntp, Family::BlockStacking, 8));
+    let training: TrainConfig = serde_json::from_value(config.training).unwrap();
+    assert_eq!(training, short(Variant::Ntp).resolved());
+    let mut table = ntp::table::read(&folder.path().join(METRICS_FILE), &TableSchema::METRICS).unwrap();
+    let steps = table.int64("step").unwrap();
+    assert_eq!(steps, summary.metrics.iter().map(|metric| i64::from(metric.step)).collect::<Vec<_>>());
+    assert_eq!(steps.len(), 6 * 4);
+}
+
+#[test]
+fn data_and_settings_that_make_no_sense_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |config: &TrainConfig, data: &DatasetTrials| {
+        let error = train_until(config, data, folder.path(), None).unwrap_err();
+        assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "something was written");
+        error
+    };
+    let config = short(Variant::Ntp);
+    let unseen = demonstrations(&[tower("c", &[6, 7], Split::Unseen)], 2);
+    assert!(matches!(refused(&config, &unseen), TrainError::NoTrials { total: 2 }));
+    let mut broken = towers();
+    broken.trials[4].observations.pop();
+    assert!(matches!(refused(&config, &broken), TrainError::Trial { trial: 1, .. }));
+    let mut broken = towers();
+    broken.trials[0].calls[2].output = Some(span(0, 90));
+    assert!(matches!(refused(&config, &broken), TrainError::Trial { trial: 0, .. }));
+    let mut mixed = towers();
+    mixed.trials.extend(demonstrations(&[sorting("m", [0, 1, 2, 3], Split::Seen)], 1).trials);
+    assert!(matches!(refused(&config, &mixed), TrainError::MixedFamilies { .. }));
+    let none = TrainConfig { steps: 0, ..config.clone() };
+    assert!(matches!(refused(&none, &towers()), TrainError::Config { key: "steps", .. }));
+    let much = TrainConfig { gripper_jitter: Some(1.5), ..config };
+    let error = refused(&much, &towers()).to_string();
+    assert_eq!(error, "train.gripper_jitter is 1.5; allowed: from 0 to 1");
+}
+
+/// Success of a model's policy on tasks it has not seen, one rollout each.
+fn success_rate(folder: &Path, tasks: &[Task]) -> f32 {
+    let (_, mut policy) = load_policy(folder, Decoder::Argmax).unwrap();
+    let start = |task| {
+        let own = trial(task, 100, 1);
+        Start {
+            task,
+            demonstration: demonstration(task, &trial(task, 101, 1), 0),
+            world: Box::new(KinematicWorld::new(task.family, &own)),
+            provenance: Provenance::new(task, &own, Actor::Policy(String::new()), 0),
+        }
+    };
+    let rollouts = run(policy.as_mut(), tasks.iter().map(start).collect(), Limits::default()).unwrap();
+    let successes = rollouts.iter().filter(|rollout| rollout.episode.outcome.is_success()).count();
+    successes as f32 / tasks.len() as f32
+}
+
+fn last(metrics: &[Metric], level: Program) -> Metric {
+    metrics.iter().rfind(|metric| metric.level == level).unwrap().clone()
+}
+
+#[test]
+fn a_short_training_stacks_unseen_towers() {
+    let set = sample(Family::BlockStacking, 20, 20, Seed(3)).unwrap();
+    let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig { steps: 300, gripper_jitter: Some(0.0), ..TrainConfig::default() };
+    let summary = train_until(&config, &demonstrations(&seen, 10), folder.path(), None).unwrap();
+    let (first, root) = (&summary.metrics[0], last(&summary.metrics, Program::BlockStacking));
+    assert!(root.loss_total < 0.1 * first.loss_total, "{} of {}", root.loss_total, first.loss_total);
+    for level in [Program::Pick, Program::Place] {
+        let argument = last(&summary.metrics, level).loss_argument.unwrap();
+        assert!(argument < 0.1, "{level}: {argument}, and guessing has {}", 8.0_f32.ln());
+    }
+    let rate = success_rate(folder.path(), &unseen);
+    assert!(rate >= 0.8, "{rate}");
+}
