@@ -1,7 +1,6 @@
 //! Compiles `schemas/mcap` into Rust types and, for each message type that recordings name, a descriptor set.
 //!
 //! No `protoc`: `protox` is a compiler of `.proto` in Rust.
-#![expect(clippy::print_stdout, reason = "how a build script speaks to cargo")]
 
 use std::error::Error;
 use std::fs;

@@ -7,7 +7,7 @@ use crate::scene::{BodyIndex, Mobility, Shape, SlotIndex};
 use crate::sim::Simulation;
 use crate::sim::gripper::{Gripper, MAX_OPENING_M, TIP_M};
 use crate::sim::motion::{Motion, Tool};
-use crate::sim::world::AtStart;
+use crate::sim::sweep::AtStart;
 use crate::sim::{drop_spot, grasp};
 use crate::trace::Cause;
 
@@ -128,9 +128,9 @@ impl Simulation {
 
     /// Steps until all is at rest.
     fn rest(&mut self) -> Result<(), Cause> {
-        for _ in 0..self.config.settle_limit_steps() {
+        for step in 0..self.config.settle_limit_steps() {
             self.tick(self.gripper.tool, Air::Unknown);
-            if self.world.is_quiet(None) {
+            if self.is_at_rest(step) {
                 return Ok(());
             }
         }

@@ -15,7 +15,8 @@ use rapier3d::math::{Pose as EnginePose, Vector};
 
 use crate::scene::BodyIndex;
 use crate::sim::motion::Tool;
-use crate::sim::world::{AtStart, GRIPPER_GROUP, SCENE_GROUP, World, groups};
+use crate::sim::sweep::AtStart;
+use crate::sim::world::{GRIPPER_GROUP, SCENE_GROUP, World, groups};
 
 /// The widest opening, in metres.
 pub(super) const MAX_OPENING_M: f32 = 0.07;
@@ -188,9 +189,7 @@ impl Gripper {
     pub(super) fn free_way_m(&self, world: &World, tool: &Tool, path: Vector, at_start: AtStart) -> f32 {
         let held = self.held_handle();
         let parts = hull(tool).into_iter().chain(self.carried(world, tool));
-        parts
-            .filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held))
-            .fold(path.length(), |least, hit| least.min(hit.distance_m))
+        parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
     }
 }
 

@@ -20,7 +20,7 @@ pub struct TrainConfig {
     pub seed: u64,
     /// Decisions of the root program in a step; programs below it have half as many each.
     pub batch: u32,
-    /// Highest learning rate; by default 0.003 for object-centric and 0.001 for flattened networks.
+    /// Highest learning rate; by default 0.003 for object-centric and 0.002 for flattened networks.
     pub learning_rate: Option<f32>,
     /// Steps in which the learning rate rises from zero.
     pub warmup_steps: u32,
@@ -123,7 +123,7 @@ impl TrainConfig {
     pub fn resolved(&self) -> Self {
         let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
             Variant::Ntp => (0.003, 0.0, 0.2),
-            Variant::NtpPaper => (0.001, 1.0, 0.0),
+            Variant::NtpPaper => (0.002, 1.0, 0.0),
         };
         Self {
             name: Some(self.name().to_owned()),

@@ -182,7 +182,7 @@ impl Bench {
 
         let unseen: Vec<&Task> = tasks.of_split(Split::Unseen).collect();
         let (rollouts, secs) = cpu_secs(|| {
-            let starts = unseen.iter().map(|task| start(task, demonstration_of(task))).collect();
+            let starts: Vec<Start<'_>> = unseen.iter().map(|task| start(task, demonstration_of(task))).collect();
             let mut oracle = ntp::rollout::Oracle::for_starts(&starts);
             run(&mut oracle, starts, Limits::default()).expect("the trace is right").len()
         });

@@ -1,1 +1,79 @@
-//! Placeholder.
+//! The process boundary: streams, exit codes, help.
+#![cfg(test)]
+
+use assert_cmd::Command;
+
+fn ntp() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ntp"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+#[test]
+fn help_names_every_command_and_the_exit_codes() {
+    let output = ntp().arg("--help").output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn a_stage_that_does_not_exist_is_refused_with_those_that_do() {
+    let output = ntp().args(["run", "pipelines/smoke.toml", "--from", "bake"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("bake") && text.contains("generate"), "{text}");
+}
+
+#[test]
+fn something_that_is_nothing_of_ours_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = ntp().arg("inspect").arg(folder.path()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("dataset (meta/info.json)"), "{text}");
+}
+
+#[test]
+fn replay_without_a_purpose_says_what_to_choose() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    ntp().args(["run", "pipelines/smoke.toml", "--to", "generate", "--out"]).arg(&out).assert().success();
+    let output = ntp().arg("replay").arg(out.join("recordings")).args(["--episode", "0"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("--save FILE.rrd"));
+    let output =
+        ntp().arg("replay").arg(out.join("recordings")).args(["--episode", "99", "--verify"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("no episode 99 among the 9"));
+}
+
+#[test]
+fn completions_are_printed_for_a_shell() {
+    let output = ntp().args(["completions", "bash"]).output().unwrap();
+    assert!(String::from_utf8(output.stdout).unwrap().contains("_ntp()"));
+}
+
+#[test]
+fn inspect_says_what_each_part_of_a_run_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    ntp().args(["run", "pipelines/smoke.toml", "--out"]).arg(&out).assert().success();
+    let kind = |part: &str| {
+        let output = ntp().arg("inspect").arg(out.join(part)).arg("--json").output().unwrap();
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        value["kind"].as_str().unwrap().to_owned()
+    };
+    let parts = [
+        ("", "run"),
+        ("tasks", "tasks"),
+        ("recordings", "recordings"),
+        ("recordings/shard-00000-of-00003.mcap", "recording"),
+        ("dataset", "dataset"),
+        ("models/ntp-seed0", "model"),
+        ("rollouts/oracle/stacking_unseen", "rollouts"),
+        ("report", "report"),
+    ];
+    for (part, expected) in parts {
+        assert_eq!(kind(part), expected, "{part}");
+    }
+}

@@ -1,1 +1,244 @@
-//! Placeholder.
+//! Runs as a whole: the shortest pipeline through every stage, and what happens when a run is broken off.
+#![cfg(test)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use ntp::artifact::sha256_file;
+use ntp::pipeline::{Pipeline, PipelineError};
+
+fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn ntp(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ntp"));
+    command.args(arguments).current_dir(repository()).stdin(Stdio::null());
+    command
+}
+
+/// Runs to the end and gives exit code, stdout and stderr.
+fn run(arguments: &[&str]) -> (i32, String, String) {
+    let output = ntp(arguments).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+fn run_smoke(out: &Path, more: &[&str]) -> (i32, String, String) {
+    let out = out.to_string_lossy();
+    run(&[&["run", "pipelines/smoke.toml", "--out", out.as_ref()], more].concat())
+}
+
+/// Every file below the folders of a run, with its hash, in order.
+fn hashes(run: &Path, folders: &[&str]) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let mut waiting: Vec<PathBuf> = folders.iter().map(|folder| run.join(folder)).collect();
+    while let Some(folder) = waiting.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else {
+                let name = path.strip_prefix(run).unwrap().to_string_lossy().into_owned();
+                found.push((name, sha256_file(&path).unwrap()));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+const ALL: [&str; 6] = ["tasks", "recordings", "dataset", "models", "rollouts", "report"];
+
+#[test]
+fn a_second_run_finds_every_stage_up_to_date_and_changes_no_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, stderr) = run_smoke(folder.path(), &[]);
+    assert_eq!(code, 0, "{stderr}");
+    let before = hashes(folder.path(), &ALL);
+    let (code, stdout, _) = run_smoke(folder.path(), &[]);
+    assert_eq!(code, 0);
+    assert_eq!(stdout.lines().count(), 7, "{stdout}");
+    assert!(stdout.lines().all(|line| line.contains("up to date")), "{stdout}");
+    assert_eq!(hashes(folder.path(), &ALL), before);
+}
+
+#[test]
+fn one_job_and_two_give_the_same_bytes_in_every_stage() {
+    let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    assert_eq!(run_smoke(one.path(), &["--jobs", "1"]).0, 0);
+    assert_eq!(run_smoke(two.path(), &["--jobs", "2"]).0, 0);
+    assert_eq!(hashes(one.path(), &ALL), hashes(two.path(), &ALL));
+}
+
+#[test]
+fn a_run_killed_at_any_moment_carries_on_to_the_same_bytes() {
+    let whole = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(whole.path(), &[]).0, 0);
+    let wanted = hashes(whole.path(), &ALL);
+    for kill_after_millis in [20, 60, 120, 200, 300, 450] {
+        let broken = tempfile::tempdir().unwrap();
+        let out = broken.path().to_string_lossy();
+        let mut child = ntp(&["run", "pipelines/smoke.toml", "--out", out.as_ref()])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(kill_after_millis));
+        // A child that has already ended is fine: some of the moments lie behind the end.
+        let _ended = child.kill();
+        child.wait().unwrap();
+        let (code, _, stderr) = run_smoke(broken.path(), &[]);
+        assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
+        let found = hashes(broken.path(), &ALL);
+        let differing: Vec<_> = found.iter().filter(|file| !wanted.contains(file)).collect();
+        assert!(differing.is_empty(), "killed after {kill_after_millis} ms: {differing:?}");
+        assert_eq!(found.len(), wanted.len(), "killed after {kill_after_millis} ms");
+    }
+}
+
+#[test]
+fn a_second_run_on_the_same_directory_says_so_and_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let _lock = ntp::artifact::RunLock::take(folder.path()).unwrap();
+    let (code, _, stderr) = run_smoke(folder.path(), &[]);
+    assert_eq!(code, 1);
+    assert!(stderr.contains("another ntp command is writing"), "{stderr}");
+}
+
+#[test]
+fn shards_done_one_by_one_are_committed_by_the_stage() {
+    let (whole, by_shard) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    assert_eq!(run_smoke(whole.path(), &["--to", "generate"]).0, 0);
+    let out = by_shard.path().to_string_lossy();
+    assert_eq!(run(&["tasks", "pipelines/smoke.toml", "--out", out.as_ref()]).0, 0);
+    for shard in ["2", "0", "1"] {
+        let arguments = ["generate", "pipelines/smoke.toml", "--out", out.as_ref(), "--shard", shard];
+        assert_eq!(run(&arguments).0, 0);
+    }
+    assert_eq!(run(&["generate", "pipelines/smoke.toml", "--out", out.as_ref()]).0, 0);
+    assert_eq!(hashes(whole.path(), &["recordings"]), hashes(by_shard.path(), &["recordings"]));
+}
+
+#[test]
+fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &[]).0, 0);
+    let changed =
+        std::fs::read_to_string(repository().join("pipelines/smoke.toml")).unwrap().replace("steps = 6", "steps = 7");
+    let pipeline = folder.path().join("changed.toml");
+    std::fs::write(&pipeline, changed).unwrap();
+    let (path, out) = (pipeline.to_string_lossy(), folder.path().to_string_lossy());
+    let (code, stdout, _) = run(&["run", path.as_ref(), "--out", out.as_ref(), "--dry-run"]);
+    assert_eq!(code, 0);
+    let line = |start: &str| stdout.lines().find(|line| line.starts_with(start)).unwrap_or_default().to_owned();
+    assert!(line("convert").contains("up to date"), "{stdout}");
+    assert!(line("train").contains("its setting training changed"), "{stdout}");
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &["--to", "convert"]).0, 0);
+    let before = hashes(folder.path(), &["recordings", "dataset"]);
+    let recording = folder.path().join("recordings/shard-00001-of-00003.mcap");
+    let bytes = std::fs::read(&recording).unwrap();
+    std::fs::write(&recording, &bytes[..bytes.len() / 2]).unwrap();
+    let (code, stdout, stderr) = run_smoke(folder.path(), &["--to", "convert"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("its manifest says"), "{stdout}");
+    assert_eq!(hashes(folder.path(), &["recordings", "dataset"]), before);
+}
+
+#[test]
+fn validate_names_a_flipped_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &["--to", "convert"]).0, 0);
+    let out = folder.path().to_string_lossy();
+    let (code, stdout, _) = run(&["validate", out.as_ref()]);
+    assert_eq!(code, 0, "{stdout}");
+    let recording = folder.path().join("recordings/shard-00001-of-00003.mcap");
+    let mut bytes = std::fs::read(&recording).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    std::fs::write(&recording, bytes).unwrap();
+    let (code, stdout, _) = run(&["validate", out.as_ref()]);
+    assert_eq!(code, 1);
+    assert!(stdout.contains("MANIFEST") && stdout.contains("shard-00001-of-00003.mcap"), "{stdout}");
+}
+
+#[test]
+fn an_episode_simulated_again_is_the_same_in_every_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &[]).0, 0);
+    for part in ["recordings", "rollouts/oracle/stacking_unseen", "rollouts/ntp-seed0/stacking_unseen"] {
+        let path = folder.path().join(part);
+        let (code, stdout, stderr) = run(&["replay", path.to_string_lossy().as_ref(), "--episode", "1", "--verify"]);
+        assert_eq!(code, 0, "{part}: {stdout} {stderr}");
+        assert!(stdout.contains("are the same"), "{stdout}");
+    }
+}
+
+#[test]
+fn every_shipped_pipeline_can_be_loaded() {
+    for entry in std::fs::read_dir(repository().join("pipelines")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            Pipeline::load(&path).unwrap();
+        }
+    }
+}
+
+fn check_refused(change: impl Fn(&str) -> String, key: &str, allowed: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrong.toml");
+    let text = std::fs::read_to_string(repository().join("pipelines/smoke.toml")).unwrap();
+    let changed = change(&text);
+    assert_ne!(changed, text);
+    std::fs::write(&path, changed).unwrap();
+    let error = Pipeline::load(&path).unwrap_err();
+    assert!(error.is_usage());
+    let message = error.to_string();
+    for part in ["wrong.toml", key, allowed] {
+        assert!(message.contains(part), "{message} does not say {part}");
+    }
+    let out = folder.path().join("out");
+    let arguments = ["run", &path.to_string_lossy(), "--out", &out.to_string_lossy()];
+    assert_eq!(run(&arguments).0, 2);
+    assert!(!out.exists(), "something was written");
+}
+
+#[test]
+fn a_wrong_pipeline_file_names_file_key_and_what_is_allowed_and_writes_nothing() {
+    check_refused(|text| text.replace("[generate]", "[generate]\ncolour = 1"), "colour", "trials_per_task");
+    check_refused(|text| text.replace("train = 3", "train = \"three\""), "train", "u32");
+    check_refused(|text| text.replace("train = 3", "train = 0"), "tasks.train", "at least 1");
+    check_refused(|text| text.replace("block_stacking", "block_stackin"), "block_stackin", "object_sorting");
+    check_refused(|text| text.replace("variant = \"ntp\"", "variant = \"npt\""), "npt", "ntp_paper");
+    check_refused(|text| text.replace("unseen = 4", "unseen = 4\nimport = \"no.json\""), "tasks.import", "no.json");
+    check_refused(|text| text.replace("steps = 6", "steps = 0"), "training", "at least 1");
+    check_refused(|text| text.replace("split = \"unseen\"", "split = \"unknown\""), "unknown", "seen");
+    check_refused(|text| text.replace("name = \"smoke\"", "name = \"a/b\""), "name", "letters");
+    let counts = "episodes = 4\non_table = { min = 1, max = 2 }";
+    check_refused(|text| text.replace("episodes = 4\n", &format!("{counts}\n")), "on_table", "no categories");
+}
+
+#[test]
+fn a_pipeline_that_is_not_there_is_a_usage_error_with_its_path() {
+    let error = Pipeline::load(Path::new("no/such.toml")).unwrap_err();
+    assert!(matches!(error, PipelineError::Syntax { .. }));
+    assert!(error.to_string().contains("no/such.toml"));
+    assert_eq!(run(&["run", "no/such.toml"]).0, 2);
+}
+
+#[test]
+fn the_committed_pipeline_schema_is_the_generated_one() {
+    let path = repository().join("schemas/pipeline.schema.json");
+    let schema = schemars::schema_for!(ntp::pipeline::PipelineSpec);
+    let generated = format!("{}\n", serde_json::to_string_pretty(&schema).unwrap());
+    if std::fs::read_to_string(&path).ok().as_ref() != Some(&generated) {
+        std::fs::write(&path, &generated).unwrap();
+        panic!("{} was stale and has been written anew: look at the change and commit it", path.display());
+    }
+}

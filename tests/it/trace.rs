@@ -1,1 +1,153 @@
-//! Placeholder.
+//! The rules of the program tree: each one, broken on purpose, is named.
+#![cfg(test)]
+
+use ntp::program::Program;
+use ntp::scene::{BodyIndex, SlotIndex};
+use ntp::task::Split;
+use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, Span, TraceError};
+use proptest::prelude::*;
+
+use crate::kinematic::{demonstration, sorting, tower, trial};
+
+fn parts() -> EpisodeParts {
+    let task = tower("t", &[2, 5, 0], Split::Seen);
+    demonstration(&task, &trial(&task, 0, 1), 0).into_parts()
+}
+
+#[track_caller]
+fn check_refused(spoil: impl FnOnce(&mut EpisodeParts), expected: impl FnOnce(&TraceError) -> bool) {
+    let mut parts = parts();
+    spoil(&mut parts);
+    let error = Episode::new(parts).unwrap_err();
+    assert!(expected(&error), "{error}");
+}
+
+#[track_caller]
+fn check_call_refused(spoil: impl FnOnce(&mut EpisodeParts), expected: impl FnOnce(&CallProblem) -> bool) {
+    check_refused(spoil, |error| matches!(error, TraceError::Call { problem, .. } if expected(problem)));
+}
+
+#[test]
+fn frames_must_be_there_in_order_and_finite() {
+    check_refused(|parts| parts.frames.clear(), |error| *error == TraceError::NoFrames);
+    check_refused(|parts| parts.frames[0].boundary = false, |error| *error == TraceError::FirstFrameInside);
+    check_refused(
+        |parts| parts.frames[3].time_nanos = parts.frames[2].time_nanos,
+        |error| *error == TraceError::TimeNotIncreasing { frame: 3 },
+    );
+    check_refused(
+        |parts| parts.frames[1].state.bodies_in_world[0].translation.x = f32::NAN,
+        |error| *error == TraceError::NotFinite { frame: 1 },
+    );
+    check_refused(
+        |parts| drop(parts.frames[1].state.bodies_in_world.pop()),
+        |error| matches!(error, TraceError::BodyCount { frame: 1, found: 7, expected: 8 }),
+    );
+    check_refused(
+        |parts| parts.frames[1].slots[0] = BodyIndex(3),
+        |error| matches!(error, TraceError::ForeignBody { frame: 1, slot: 0, body: 3 }),
+    );
+}
+
+#[test]
+fn a_callee_sees_what_its_caller_chose_and_nothing_beyond() {
+    check_call_refused(
+        |parts| parts.calls[2].input.end += 1,
+        |problem| matches!(problem, CallProblem::InputIsNotCallersWindow { .. }),
+    );
+    check_call_refused(
+        |parts| parts.calls[3].output = Some(Span { begin: 0, end: 6 }),
+        |problem| matches!(problem, CallProblem::OutputOutsideInput { .. }),
+    );
+    check_call_refused(
+        |parts| parts.specification_frames = 4,
+        |problem| matches!(problem, CallProblem::BeyondSpecification { end: 9, frames: 4 }),
+    );
+}
+
+#[test]
+fn siblings_are_ordered_and_each_program_ends_once() {
+    check_call_refused(
+        |parts| parts.calls[5].frames.begin = 0,
+        |problem| matches!(problem, CallProblem::SiblingOverlap { begin: 0, .. }),
+    );
+    check_call_refused(|parts| parts.calls[2].end_of_program = true, |problem| *problem == CallProblem::AfterEnd);
+    check_call_refused(
+        |parts| parts.calls[5].end_of_program = false,
+        |problem| matches!(problem, CallProblem::NotEnded { .. }),
+    );
+    check_call_refused(
+        |parts| parts.calls[5].step = 2,
+        |problem| matches!(problem, CallProblem::Step { found: 2, expected: 1 }),
+    );
+}
+
+#[test]
+fn leaves_are_primitives_with_their_arguments() {
+    check_call_refused(
+        |parts| parts.calls[4].caller = Some(CallId(3)),
+        |problem| matches!(problem, CallProblem::CallerIsLeaf { caller: Program::MoveTo }),
+    );
+    check_call_refused(
+        |parts| parts.calls[3].argument = None,
+        |problem| matches!(problem, CallProblem::Argument { program: Program::MoveTo, argument: None }),
+    );
+    check_call_refused(
+        |parts| parts.calls[3].argument = Some(SlotIndex(8)),
+        |problem| matches!(problem, CallProblem::Argument { .. }),
+    );
+    check_call_refused(
+        |parts| parts.calls[4].argument = Some(SlotIndex(0)),
+        |problem| matches!(problem, CallProblem::Argument { program: Program::Grip, .. }),
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn frames_between_boundaries_can_be_left_out_without_losing_the_tree(
+        mapping in prop::array::uniform4(0_u16..4),
+        count in 1_u16..4,
+        every in 1_usize..4,
+    ) {
+        let task = sorting("m", mapping, Split::Seen);
+        let boundaries = demonstration(&task, &trial(&task, 0, count), 0);
+        let filled = with_frames_between(boundaries.clone(), every);
+        prop_assert!(filled.frames.len() > boundaries.frames.len());
+        prop_assert_eq!(filled.boundaries_only(), boundaries);
+    }
+
+    #[test]
+    fn every_frame_of_a_span_has_one_label_and_exactly_one_starts(begin in 0_u32..20, length in 1_u32..20) {
+        let span = Span::new(begin, begin + length).unwrap();
+        let starts = (0..50).filter(|&frame| span.label(frame) == ntp::trace::ScopingLabel::Start).count();
+        let within = (0..50).filter(|&frame| span.label(frame) != ntp::trace::ScopingLabel::Outside).count();
+        prop_assert_eq!(starts, 1);
+        prop_assert_eq!(within, span.len());
+    }
+}
+
+/// The same episode with `every` frames after each boundary but the last.
+fn with_frames_between(episode: Episode, every: usize) -> Episode {
+    let mut parts = episode.into_parts();
+    let stride = every as u32 + 1;
+    let moved = |span: Span| Span { begin: span.begin * stride, end: span.last() * stride + 1 };
+    for call in &mut parts.calls {
+        call.frames = moved(call.frames);
+        call.input = moved(call.input);
+        call.output = call.output.map(moved);
+    }
+    let last = parts.frames.len() - 1;
+    let between = |(idx, frame): (usize, ntp::trace::Frame)| {
+        let copies = if idx == last { 0 } else { every };
+        (0..=copies).map(move |copy| ntp::trace::Frame {
+            time_nanos: frame.time_nanos + copy as u64,
+            boundary: copy == 0,
+            ..frame.clone()
+        })
+    };
+    parts.frames = parts.frames.drain(..).enumerate().flat_map(between).collect();
+    parts.specification_frames = parts.frames.len() as u32;
+    Episode::new(parts).unwrap()
+}
