@@ -61,7 +61,9 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub(crate) fn create(path: &Path, schema: &TableSchema, options: WriteOptions) -> Result<Self, TableError> {
-        let parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        let mut parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        // Where there is an Arrow schema in a file, pyarrow and pandas read metadata from it alone.
+        parsed.arrow = parsed.arrow.with_metadata(options.metadata.iter().cloned().collect());
         let properties = properties(&parsed, options);
         let file = AtomicFile::create(path)?;
         let options =
