@@ -3,7 +3,7 @@
 use ntp::program::Program;
 use ntp::scene::{BodyIndex, SlotIndex};
 use ntp::task::Split;
-use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, Span, TraceError};
+use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Span, TraceError};
 use proptest::prelude::*;
 
 use crate::kinematic::{demonstration, sorting, tower, trial};
@@ -62,6 +62,20 @@ fn a_callee_sees_what_its_caller_chose_and_nothing_beyond() {
         |parts| parts.specification_frames = 4,
         |problem| matches!(problem, CallProblem::BeyondSpecification { end: 9, frames: 4 }),
     );
+}
+
+#[test]
+fn a_span_that_ends_before_it_begins_is_refused() {
+    for spoil in [
+        |call: &mut ProgramCall| call.frames = Span { begin: 70, end: 0 },
+        |call: &mut ProgramCall| call.input = Span { begin: 2, end: 2 },
+        |call: &mut ProgramCall| call.output = Some(Span { begin: 1, end: 0 }),
+    ] {
+        check_call_refused(
+            |parts| spoil(&mut parts.calls[3]),
+            |problem| matches!(problem, CallProblem::EmptySpan { found } if found.is_empty()),
+        );
+    }
 }
 
 #[test]
