@@ -1,6 +1,5 @@
 //! Episodes as Rerun recordings, read back from the file.
 
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
