@@ -23,8 +23,8 @@ pub enum Action {
 }
 
 /// Height of the gripper above the centre (of an open box: the rim) of the object that `move_to` names, in metres.
-/// Half-way between levels of a tower: with 2 cm and a multiple of 5 cm a gripper that has just released on a tower
-/// would seem to hover above one of its lower blocks.
+/// Half-way between levels of a tower: with 2 cm + a multiple of 5 cm a gripper that has just released on a tower would
+/// seem to hover above one of its lower blocks.
 pub const HOVER_M: f32 = 0.145;
 /// Height of the gripper above the centre of what it holds, in metres.
 pub const GRASP_M: f32 = 0.02;

@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench throughput` measures all; `cargo bench --bench throughput -- NAME …` those named.
 
+#![expect(clippy::print_stdout, reason = "its result is what it prints")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

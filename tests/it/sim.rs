@@ -154,6 +154,20 @@ fn what_falls_off_the_table_is_named() {
     assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
 }
 
+#[test]
+fn what_is_too_heavy_for_the_fingers_is_dropped() {
+    let beam = |length_m: f32| ntp::scene::Shape::Cuboid { half_extents_m: [length_m / 2.0, 0.03, 0.03] };
+    let mut light = Table::default().with("beam", beam(0.2), [0.0, 0.0]).with("block", BLOCK, [0.0, 0.2]).world();
+    act_all(&mut light, &PICK_FIRST);
+    assert_eq!(light.act(Action::MoveTo(SlotIndex(1))), Ok(()));
+    // 2.7 kg: it is gripped, but slips as it is lifted.
+    let slab = ntp::scene::Shape::Cuboid { half_extents_m: [0.3, 0.03, 0.075] };
+    let mut heavy = Table::default().with("slab", slab, [0.0, 0.0]).with("block", BLOCK, [0.0, 0.2]).world();
+    act_all(&mut heavy, &PICK_FIRST);
+    assert_eq!(heavy.act(Action::MoveTo(SlotIndex(1))), Err(Cause::DroppedObject));
+    assert_eq!(heavy.state().held, None);
+}
+
 #[track_caller]
 fn check_refused(table: Table, expected: &str) {
     let (scene, initial) = table.parts();
