@@ -5,7 +5,7 @@
 //! Rows are [`crate::trace::Observation::to_flat`]: positions relative to the gripper, then (open, closed).
 
 use rand::Rng;
-use rand::seq::{IndexedRandom as _, SliceRandom as _};
+use rand::seq::SliceRandom as _;
 
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
@@ -54,13 +54,9 @@ impl Views {
     /// demonstration, now, or in both.
     fn scatter(&mut self, example: &Example, rng: &mut impl Rng) {
         for slot in 0..self.n_slots {
-            let [moved, demonstrated, seen, near]: [f32; 4] = rng.random();
-            let any = rng.random_range(0..self.n_slots);
-            let beside = match example.involved.choose(rng) {
-                Some(involved) if rng.random::<bool>() => usize::from(involved.0),
-                _ => any,
-            };
-            let offset = SCATTER_M.map(|reach| near * rng.random_range(-reach..reach));
+            let beside = rng.random_range(0..self.n_slots);
+            let offset = SCATTER_M.map(|reach| rng.random_range(-reach..reach));
+            let [moved, demonstrated, seen]: [f32; 3] = rng.random();
             let involved = example.involved.iter().any(|&other| usize::from(other.0) == slot);
             if involved || beside == slot || moved < 0.5 {
                 continue;
