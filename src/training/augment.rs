@@ -37,7 +37,7 @@ impl Views {
         let [relabelled, jittered, scattered]: [f32; 3] = rng.random();
         let order = relabelling(family, self.n_slots, rng);
         let place = Place::draw(self.n_slots, rng);
-        if scattered < config.scatter_bystanders.unwrap_or_default() {
+        if scattered < config.scatter_bystanders {
             self.scatter(example, rng);
         }
         if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(example, &self.state) {

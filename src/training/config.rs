@@ -22,15 +22,14 @@ impl Training {
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
-        let (learning_rate, relabel_slots, gripper_jitter, scatter_bystanders) = match self.variant {
-            Variant::Ntp => (0.003, 0.0, 0.2, 0.5),
-            Variant::NtpPaper => (0.002, 1.0, 0.0, 0.0),
+        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
+            Variant::Ntp => (0.003, 0.0, 0.2),
+            Variant::NtpPaper => (0.002, 1.0, 0.0),
         };
         let config = TrainConfig {
             learning_rate: self.config.learning_rate.or(Some(learning_rate)),
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
             gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
-            scatter_bystanders: self.config.scatter_bystanders.or(Some(scatter_bystanders)),
             ..self.config.clone()
         };
         Self { config, ..self.clone() }
@@ -67,9 +66,8 @@ pub struct TrainConfig {
     /// from learning in this budget.
     pub gripper_jitter: Option<f32>,
     /// How often slots that the running program has nothing to do with are put elsewhere, in the demonstration and
-    /// now (0 to 1): a program learns to look at its own slots alone. By default 0.5 for object-centric networks and
-    /// never for flattened ones.
-    pub scatter_bystanders: Option<f32>,
+    /// now (0 to 1): a program learns to look at its own slots alone. Off by default; Object Sorting needs it.
+    pub scatter_bystanders: f32,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -90,7 +88,7 @@ impl Default for TrainConfig {
             loss: LossWeights::default(),
             relabel_slots: None,
             gripper_jitter: None,
-            scatter_bystanders: None,
+            scatter_bystanders: 0.0,
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -158,7 +156,7 @@ impl TrainConfig {
             ("final_learning_rate", self.final_learning_rate),
             ("relabel_slots", self.relabel_slots.unwrap_or(0.0)),
             ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
-            ("scatter_bystanders", self.scatter_bystanders.unwrap_or(0.0)),
+            ("scatter_bystanders", self.scatter_bystanders),
         ];
         let weights = [
             ("loss.program", loss.program),
