@@ -229,7 +229,7 @@ fn check_metadata(path: &Path, metadata: &BTreeMap<String, String>) -> Result<Op
         return Err(RecordingError::Vocabulary { path: path.to_owned(), found: found.to_owned(), expected });
     }
     let family = metadata.get("task_family").map(|word| word.parse());
-    family.transpose().map_err(|_| foreign(path, "known task_family in its metadata"))
+    family.transpose().map_err(|_error| foreign(path, "known task_family in its metadata"))
 }
 
 /// Log time, create time, name, media type, length, data, checksum.
@@ -249,7 +249,7 @@ fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Resu
         (length == fields.rest().len() as u64).then_some(fields.rest())
     };
     let data = data().ok_or_else(broken)?.to_vec();
-    String::from_utf8(data).map_err(|_| RecordingError::Damaged {
+    String::from_utf8(data).map_err(|_error| RecordingError::Damaged {
         path: path.to_owned(),
         offset: place.0,
         source: Damage::Text { record: PLAN },

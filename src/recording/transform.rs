@@ -128,7 +128,7 @@ fn decode_doubles(mut message: &[u8], numbers: &mut [f32]) -> Result<(), Message
         let (field, wire_type) = decode_key(&mut message)?;
         match (numbers.get_mut(field as usize - 1), wire_type) {
             (Some(number), WireType::SixtyFourBit) => {
-                *number = message.try_get_f64_le().map_err(|_| MessageProblem::CutOff)? as f32;
+                *number = message.try_get_f64_le().map_err(|_error| MessageProblem::CutOff)? as f32;
             }
             _ => skip_field(wire_type, field, &mut message, DecodeContext::default())?,
         }
@@ -138,7 +138,7 @@ fn decode_doubles(mut message: &[u8], numbers: &mut [f32]) -> Result<(), Message
 
 /// The content of a length-delimited field, off the front of a message.
 fn take<'a>(message: &mut &'a [u8]) -> Result<&'a [u8], MessageProblem> {
-    let length = usize::try_from(decode_varint(message)?).map_err(|_| MessageProblem::CutOff)?;
+    let length = usize::try_from(decode_varint(message)?).map_err(|_error| MessageProblem::CutOff)?;
     let (field, rest) = message.split_at_checked(length).ok_or(MessageProblem::CutOff)?;
     *message = rest;
     Ok(field)
