@@ -12,6 +12,9 @@ mod atomic;
 mod contract;
 mod lock;
 
-pub use atomic::{AtomicFile, IoError, create_dir, hex, read, read_json, sha256_bytes, sha256_file, write, write_json};
+pub use atomic::{
+    AtomicFile, IoError, PARTIAL_PREFIX, create_dir, hex, read, read_json, remove_partials, sha256_bytes, sha256_file,
+    write, write_json,
+};
 pub use contract::{ContractError, FileEntry, Manifest, Plan, Receipt, StageDir};
 pub use lock::{LockError, RunLock};

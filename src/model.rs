@@ -28,7 +28,7 @@ mod object_centric;
 mod store;
 
 pub use config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
-pub use decoder::{Decoder, LabelScores, maximum_subsequence};
+pub use decoder::{Decoder, LabelScores, span_score};
 pub use flattened::{FlatDemonstration, FlatReading, Flattened, FlattenedConfig};
 pub use heads::{CoreOutput, ScopeHead};
 pub use memory::ProgramMemory;

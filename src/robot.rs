@@ -12,16 +12,20 @@ use crate::trace::{Cause, Frame};
 /// A call of the robot API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
-    /// Up, across above everything that stands, and down to hover [`HOVER_M`] above what the slot shows.
+    /// Up, across above everything that stands, and down to hover [`HOVER_M`] above the centre of what the slot shows,
+    /// of an open box above the middle of its rim. Higher, if something stands in between.
     MoveTo(SlotIndex),
     /// Down onto what lies below, close the fingers, hold it if it is between them.
     Grip,
-    /// Down until what is held rests on (or hangs just above) what lies below, and open the fingers.
+    /// Down until what is held rests on (or hangs just above) what lies below, and open the fingers. Over an open box
+    /// what is held goes first to where it will lie lowest.
     Release,
 }
 
-/// Height of the gripper above the centre of the object that `move_to` names, in metres.
-pub const HOVER_M: f32 = 0.12;
+/// Height of the gripper above the centre (of an open box: the rim) of the object that `move_to` names, in metres.
+/// Half-way between levels of a tower: with 2 cm + a multiple of 5 cm a gripper that has just released on a tower would
+/// seem to hover above one of its lower blocks.
+pub const HOVER_M: f32 = 0.145;
 /// Height of the gripper above the centre of what it holds, in metres.
 pub const GRASP_M: f32 = 0.02;
 

@@ -25,6 +25,7 @@ mod error;
 mod grasp;
 mod gripper;
 mod motion;
+mod sweep;
 mod watch;
 mod world;
 
@@ -43,6 +44,9 @@ use gripper::Gripper;
 use motion::Tool;
 use watch::{Watch, gravest};
 use world::World;
+
+/// How long to wait for rest before what only jitters is put to sleep, in simulated seconds.
+const PATIENCE_SECS: u32 = 1;
 
 /// A tabletop world with a gripper in it.
 ///
@@ -93,6 +97,7 @@ impl Simulation {
             dropped: None,
         };
         simulation.come_to_rest();
+        simulation.clock = clock;
         simulation.watch = Watch::new(&simulation.state());
         simulation.record(true);
         Ok(simulation)
@@ -109,13 +114,17 @@ impl Simulation {
         if air == Air::Clear && self.world.is_quiet(self.gripper.held_handle()) {
             self.gripper.fly(tool);
         } else {
-            self.gripper.drive(&mut self.world, tool);
-            self.world.step();
-            self.drop_what_slipped();
+            self.step_engine(tool);
         }
         if self.clock.tick() {
             self.record(false);
         }
+    }
+
+    fn step_engine(&mut self, tool: Tool) {
+        self.gripper.drive(&mut self.world, tool);
+        self.world.step();
+        self.drop_what_slipped();
     }
 
     fn drop_what_slipped(&mut self) {
@@ -128,16 +137,25 @@ impl Simulation {
         }
     }
 
-    /// Steps the engine, with the gripper where it is, until all but the held body sleeps.
+    /// Steps the engine, with the gripper where it is, until all is at rest; takes simulated time, records nothing.
     fn come_to_rest(&mut self) {
-        for _ in 0..self.config.settle_limit_steps() {
-            self.gripper.drive(&mut self.world, self.gripper.tool);
-            self.world.step();
-            self.drop_what_slipped();
-            if self.world.is_quiet(self.gripper.held_handle()) {
+        for step in 0..self.config.settle_limit_steps() {
+            self.step_engine(self.gripper.tool);
+            self.clock.tick();
+            if self.is_at_rest(step) {
                 return;
             }
         }
+    }
+
+    /// Whether all but the held body sleeps, after so many steps of waiting for it.
+    fn is_at_rest(&mut self, n_steps: u32) -> bool {
+        let held = self.gripper.held_handle();
+        let is_quiet = self.world.is_quiet(held);
+        if !is_quiet && n_steps >= PATIENCE_SECS * self.config.step_hz {
+            self.world.calm(held);
+        }
+        is_quiet
     }
 
     /// Appends a frame. A frame between boundaries that is due at the very end of an action is the boundary.

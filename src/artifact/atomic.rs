@@ -9,6 +9,9 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
+/// How names begin of what is not whole yet.
+pub const PARTIAL_PREFIX: &str = ".partial-";
+
 /// A file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum IoError {
@@ -58,7 +61,7 @@ impl AtomicFile {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         create_dir(folder)?;
         let file = tempfile::Builder::new()
-            .prefix(".partial-")
+            .prefix(PARTIAL_PREFIX)
             .tempfile_in(folder)
             .map_err(IoError::system("create a temporary file in", folder))?;
         Ok(Self { writer: BufWriter::with_capacity(1 << 18, file), path: path.to_owned() })
@@ -117,6 +120,30 @@ impl Seek for AtomicFile {
     fn seek(&mut self, position: SeekFrom) -> std::io::Result<u64> {
         self.writer.seek(position)
     }
+}
+
+/// Removes the temporary files that a killed process left below a folder. No other process may be writing there.
+///
+/// # Errors
+///
+/// When the system refuses.
+pub fn remove_partials(folder: &Path) -> Result<(), IoError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(source) => return Err(IoError::system("list", folder)(source)),
+    };
+    for entry in entries {
+        let path = entry.map_err(IoError::system("list", folder))?.path();
+        let is_partial = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PARTIAL_PREFIX));
+        match (path.is_dir(), is_partial) {
+            (true, true) => std::fs::remove_dir_all(&path).map_err(IoError::system("remove", &path))?,
+            (true, false) => remove_partials(&path)?,
+            (false, true) => std::fs::remove_file(&path).map_err(IoError::system("remove", &path))?,
+            (false, false) => {}
+        }
+    }
+    Ok(())
 }
 
 /// Makes a folder and its parents.

@@ -212,14 +212,15 @@ impl StageDir {
         Ok(sha256_file(&self.manifest_path())?)
     }
 
-    /// The receipt of a shard, if it was made by this plan.
+    /// The receipt of a shard, if it was made by this plan and its files are there in their sizes.
     ///
     /// # Errors
     ///
     /// When it is there but not readable.
     pub fn receipt(&self, plan: &Plan, shard: u32) -> Result<Option<Receipt>, IoError> {
         let receipt: Option<Receipt> = read_if_there(&self.receipt_path(shard))?;
-        Ok(receipt.filter(|receipt| receipt.plan_id == plan.id() && receipt.shard == shard))
+        let of_plan = receipt.filter(|receipt| receipt.plan_id == plan.id() && receipt.shard == shard);
+        Ok(of_plan.filter(|receipt| receipt.files.iter().all(|file| self.check_file(file, false).is_ok())))
     }
 
     /// Begins (or goes on with) a plan: what another plan left is removed first.

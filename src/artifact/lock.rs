@@ -27,12 +27,25 @@ pub enum LockError {
 }
 
 impl RunLock {
-    /// Takes the lock of a run directory, which is made if needed.
+    /// Takes the lock of a run directory, which is made if needed, for this process alone.
     ///
     /// # Errors
     ///
     /// [`LockError::Held`] at once when another process has it.
     pub fn take(directory: &Path) -> Result<Self, LockError> {
+        Self::lock(directory, File::try_lock)
+    }
+
+    /// Takes it together with other processes that do the same: each does shards of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`LockError::Held`] at once when another process has it alone.
+    pub fn share(directory: &Path) -> Result<Self, LockError> {
+        Self::lock(directory, File::try_lock_shared)
+    }
+
+    fn lock(directory: &Path, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Self, LockError> {
         create_dir(directory)?;
         let path = directory.join(".lock");
         let file = OpenOptions::new()
@@ -41,7 +54,7 @@ impl RunLock {
             .write(true)
             .open(&path)
             .map_err(IoError::system("open", &path))?;
-        match file.try_lock() {
+        match lock(&file) {
             Ok(()) => Ok(Self { _file: file }),
             Err(TryLockError::WouldBlock) => Err(LockError::Held { directory: directory.to_owned() }),
             Err(TryLockError::Error(source)) => Err(IoError::system("lock", &path)(source).into()),

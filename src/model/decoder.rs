@@ -18,14 +18,17 @@ pub type LabelScores = [f32; ScopingLabel::ALL.len()];
 pub enum Decoder {
     /// The likeliest Start, and the likeliest End not before it: the paper's choice.
     Argmax,
-    /// The maximum contiguous subsequence of the log odds of being in the part.
+    /// The span whose labelling is the likeliest, all frames counted: a maximum contiguous subsequence.
     #[default]
     Mss,
-    /// The likeliest Start, then the End with the largest sum of those log odds.
+    /// The likeliest Start, then the End that makes the likeliest labelling with it.
     Am,
 }
 
 impl Decoder {
+    /// Every decoder.
+    pub const ALL: [Self; 3] = [Self::Argmax, Self::Mss, Self::Am];
+
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -35,34 +38,67 @@ impl Decoder {
         }
     }
 
-    /// The span within a window; `None` for a window without frames. Of several best ones the first.
+    /// The span within a window; `None` for a window without frames. Of several equally good ones the first.
     pub fn decode(self, frames: &[LabelScores]) -> Option<Span> {
+        let start = || first_max(frames.iter().map(|scores| scores[ScopingLabel::Start as usize]));
         let (begin, last) = match self {
             Self::Argmax => {
-                let begin = first_max(frames.iter().map(|scores| scores[ScopingLabel::Start as usize]))?;
+                let begin = start()?;
                 let ends = frames[begin..].iter().map(|scores| scores[ScopingLabel::End as usize]);
                 (begin, begin + first_max(ends)?)
             }
-            Self::Mss => maximum_subsequence(frames.iter().map(log_odds))?,
+            Self::Mss => likeliest_span(frames)?,
             Self::Am => {
-                let begin = first_max(frames.iter().map(|scores| scores[ScopingLabel::Start as usize]))?;
-                let sums = frames[begin..].iter().scan(0.0, |sum, scores| {
-                    *sum += log_odds(scores);
-                    Some(*sum)
-                });
-                (begin, begin + first_max(sums)?)
+                let begin = start()?;
+                (begin, begin + likeliest_end(&frames[begin..])?)
             }
         };
         Span::new(begin as u32, last as u32 + 1)
     }
 }
 
-/// Of being in the part (Start, Inside or End) against outside it.
-fn log_odds(scores: &LabelScores) -> f32 {
-    let [start, end, inside, outside] = *scores;
-    let largest = start.max(end).max(inside);
-    let within = [start, end, inside].iter().map(|score| (score - largest).exp()).sum::<f32>().ln() + largest;
-    within - outside
+/// Log odds of a label against Outside, which the frame would have beyond the span.
+fn odds(scores: &LabelScores, label: ScopingLabel) -> f32 {
+    scores[label as usize] - scores[ScopingLabel::Outside as usize]
+}
+
+/// By how much a span's labelling (Start, Inside, …, Inside, End) is likelier than all frames Outside. A span of one
+/// frame is Start.
+pub fn span_score(frames: &[LabelScores], span: Span) -> f32 {
+    (span.begin..span.end).map(|frame| odds(&frames[frame as usize], span.label(frame))).sum()
+}
+
+/// The first and last frame of the span with the highest [`span_score`], in one pass: up to each frame it is enough to
+/// know the best span that is still open there.
+fn likeliest_span(frames: &[LabelScores]) -> Option<(usize, usize)> {
+    let mut best: Option<(f32, usize, usize)> = None;
+    let mut open: Option<(f32, usize)> = None;
+    for (frame, scores) in frames.iter().enumerate() {
+        let start = odds(scores, ScopingLabel::Start);
+        let closed = open.map(|(score, begin)| (score + odds(scores, ScopingLabel::End), begin));
+        for (score, begin) in [closed, Some((start, frame))].into_iter().flatten() {
+            if best.is_none_or(|(highest, ..)| score > highest) {
+                best = Some((score, begin, frame));
+            }
+        }
+        let going_on = open.map(|(score, begin)| (score + odds(scores, ScopingLabel::Inside), begin));
+        open = Some(going_on.filter(|(score, _)| *score >= start).unwrap_or((start, frame)));
+    }
+    best.map(|(_, begin, last)| (begin, last))
+}
+
+/// The last frame of the best span that starts at the first.
+fn likeliest_end(frames: &[LabelScores]) -> Option<usize> {
+    let mut inside = 0.0;
+    let scores = frames.iter().enumerate().map(|(frame, scores)| match frame {
+        0 => 0.0,
+        _ => {
+            let score = inside + odds(scores, ScopingLabel::End);
+            inside += odds(scores, ScopingLabel::Inside);
+            score
+        }
+    });
+    first_max(scores)
 }
 
 /// Position of the largest value, the first of several.
@@ -74,20 +110,4 @@ fn first_max(values: impl Iterator<Item = f32>) -> Option<usize> {
         }
     }
     best.map(|(position, _)| position)
-}
-
-/// First and last position of the contiguous part with the largest sum, at least one long, in one pass (Kadane).
-pub fn maximum_subsequence(values: impl Iterator<Item = f32>) -> Option<(usize, usize)> {
-    let mut best: Option<(f32, usize, usize)> = None;
-    let (mut sum, mut begin) = (0.0_f32, 0);
-    for (position, value) in values.enumerate() {
-        if sum <= 0.0 {
-            (sum, begin) = (0.0, position);
-        }
-        sum += value;
-        if best.is_none_or(|(largest, ..)| sum > largest) {
-            best = Some((sum, begin, position));
-        }
-    }
-    best.map(|(_, begin, last)| (begin, last))
 }

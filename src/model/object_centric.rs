@@ -205,8 +205,8 @@ impl Network for ObjectCentric {
         let frames = reading.frames.clone();
         let [n_batch, n_frames, width] = frames.dims();
         // What came before a frame tells whether a segment that is still to do lies before it.
-        let before = frames.clone().narrow(1, 0, n_frames - 1).cummax(1);
-        let before = Tensor::cat(vec![Tensor::zeros([n_batch, 1, width], &frames.device()), before], 1);
+        let first = Tensor::zeros([n_batch, 1, width], &frames.device());
+        let before = Tensor::cat(vec![first, frames.clone()], 1).narrow(1, 0, n_frames).cummax(1);
         self.scope.forward(Tensor::cat(vec![frames, before], 2), self.program_and_state(reading, program))
     }
 

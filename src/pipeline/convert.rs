@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::artifact::{FileEntry, IoError, Plan, Receipt, StageDir};
+use crate::artifact::{FileEntry, IoError, PARTIAL_PREFIX, Plan, Receipt, StageDir};
 use crate::dataset::{self, RecordingEpisodes};
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{PipelineError, Stage};
@@ -20,8 +20,8 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
 pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
     let recordings = context.dir.recordings();
     let manifest = recordings.finished()?;
-    recordings.check_files(&manifest, false)?;
-    let partial = StageDir::new(Stage::Convert.name(), context.dir.root().join(".dataset-partial"));
+    recordings.check_files(&manifest, true)?;
+    let partial = StageDir::new(Stage::Convert.name(), context.dir.root().join(format!("{PARTIAL_PREFIX}dataset")));
     partial.clear()?;
     let progress = context.progress(unit, manifest.episodes, "episodes");
     let read = |file: &FileEntry| -> Result<_, RecordingError> {
@@ -32,7 +32,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
             episodes: episodes.map(|episode| {
                 progress.inc(1);
                 context.go_on().map_err(Box::new)?;
-                Ok(episode.map_err(PipelineError::from).map_err(Box::new)?)
+                episode.map_err(PipelineError::from).map_err(Box::new)
             }),
         })
     };

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
-use crate::artifact::{ContractError, IoError, Plan, RunLock, StageDir};
+use crate::artifact::{ContractError, IoError, Plan, RunLock, StageDir, remove_partials};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, convert, generate, report, rollout, tasks, train};
 
 /// What the command line chooses.
@@ -107,7 +107,7 @@ impl Context<'_> {
 ///
 /// The first thing that went wrong; what was committed before stays.
 pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
-    let _lock = if options.dry_run { None } else { Some(RunLock::take(dir.root())?) };
+    let _lock = lock(dir, options)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|error| {
         PipelineError::Value { path: pipeline.path.clone(), key: "--jobs".to_owned(), problem: error.to_string() }
     })?;
@@ -122,6 +122,19 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
         }
     }
     Ok(reports)
+}
+
+/// A whole run has its directory alone and clears away what a killed one left; shards may be done side by side.
+fn lock(dir: &RunDir, options: &Options) -> Result<Option<RunLock>, PipelineError> {
+    if options.dry_run {
+        return Ok(None);
+    }
+    if options.shard.is_some() {
+        return Ok(Some(RunLock::share(dir.root())?));
+    }
+    let lock = RunLock::take(dir.root())?;
+    remove_partials(dir.root())?;
+    Ok(Some(lock))
 }
 
 fn say_up_to_date(report: &StageReport) {

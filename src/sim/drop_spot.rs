@@ -6,7 +6,8 @@ use crate::geometry::Vec3;
 use crate::scene::{BodyIndex, Scene, Shape};
 use crate::sim::gripper::{Gripper, OPEN_REACH_M, PALM_HALF_X_M};
 use crate::sim::motion::Tool;
-use crate::sim::world::{AtStart, World};
+use crate::sim::sweep::AtStart;
+use crate::sim::world::World;
 
 /// Least distance of gripper and load from the walls, in metres.
 const WALL_MARGIN_M: f32 = 0.006;
@@ -66,5 +67,5 @@ fn fall_m(world: &World, gripper: &Gripper, spot: Vector) -> f32 {
         return 0.0;
     };
     let hit = world.cast(&*shape, &in_world, down, AtStart::Stops, gripper.held_handle());
-    hit.map_or(down.length(), |hit| hit.distance_m)
+    hit.unwrap_or(down.length())
 }

@@ -7,13 +7,14 @@
 //!
 //! # Source
 //!
-//! Contact stiffness is measured, not derived: with the engine's defaults an 8-high tower of 5 cm cubes is 16 mm too
-//! short, with [`CONTACT_HZ`] at 240 steps per second about 1 mm, and stiffer contacts drift.
+//! The constants are measured, not derived, at 240 steps per second. With the engine's defaults an 8-high tower of 5 cm
+//! cubes is 16 mm too short; with [`CONTACT_HZ`] 0.7 mm, and stiffer contacts drift sideways. With a rest speed of
+//! half [`REST_M_PER_S`] and no damping two of five piles of 40 objects never slept.
 
-use rapier3d::dynamics::{RigidBody, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients};
+use rapier3d::dynamics::{ImpulseJointHandle, RigidBody, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients};
 use rapier3d::geometry::{ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, Ray};
 use rapier3d::math::{Pose as EnginePose, Vector};
-use rapier3d::parry::query::ShapeCastOptions;
+use rapier3d::parry::bounding_volume::BoundingVolume as _;
 use rapier3d::parry::shape::Shape as EngineShape;
 use rapier3d::pipeline::{PhysicsWorld, QueryFilter, QueryPipeline};
 
@@ -21,21 +22,28 @@ use crate::geometry::Pose;
 use crate::scene::{BodyIndex, Mobility, Scene, SceneState, Shape};
 use crate::sim::SimulationConfig;
 use crate::sim::engine_shape::{Part, from_engine, parts, to_engine};
+use crate::sim::sweep::{self, AtStart};
 
 /// Natural frequency of contacts, in Hz.
-const CONTACT_HZ: f32 = 120.0;
+const CONTACT_HZ: f32 = 150.0;
 const CONTACT_DAMPING: f32 = 10.0;
 /// How near two surfaces must be for the engine to look for contacts, in metres.
 const PREDICTION_M: f32 = 0.002;
-/// How far a pair may move before its contacts are computed anew, in metres.
+/// How far a pair may move before its contacts are computed anew, in metres. Contacts that lag behind drive what
+/// rolls: at 1 mm a lying can never stops.
 const RECYCLE_M: f32 = 0.000_2;
+/// The standoff that the engine keeps, in metres.
+const SLOP_M: f32 = 0.000_2;
 /// A body that moves slower than twice this for [`REST_SECS`] is put to sleep, in metres per second.
-const REST_M_PER_S: f32 = 0.004;
-const REST_SECS: f32 = 0.06;
+const REST_M_PER_S: f32 = 0.02;
+const REST_SECS: f32 = 0.05;
+/// What has not come to rest for long and is slower than this only jitters, in metres per second.
+const JITTER_M_PER_S: f32 = 0.1;
 const DENSITY_KG_PER_M3: f32 = 500.0;
 const FRICTION: f32 = 0.7;
-/// Stands in for the rolling resistance that the engine does not have, in 1/s.
-const BALL_ANGULAR_DAMPING: f32 = 8.0;
+/// Loss of spin, in 1/s. Of balls it stands in for the rolling resistance that the engine does not have.
+const ANGULAR_DAMPING: f32 = 4.0;
+const BALL_ANGULAR_DAMPING: f32 = 40.0;
 const TABLE_HALF_THICKNESS_M: f32 = 0.02;
 /// Where what falls off the table comes to rest.
 const GROUND_Z_M: f32 = -0.4;
@@ -58,15 +66,6 @@ pub(super) struct Hit {
     pub(super) body: Option<BodyIndex>,
     /// How far away, in metres.
     pub(super) distance_m: f32,
-}
-
-/// Whether a cast that starts in touch with something is over at once.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum AtStart {
-    /// It is.
-    Stops,
-    /// Only if it goes on into it.
-    MayLeave,
 }
 
 /// Table, ground and bodies in the engine.
@@ -123,6 +122,29 @@ impl World {
         !self.engine.islands.active_bodies().any(|handle| awake(&handle))
     }
 
+    /// Puts everything but `held` to sleep if it only jitters: a pile may do so in the engine for ever.
+    pub(super) fn calm(&mut self, held: Option<RigidBodyHandle>) {
+        let PhysicsWorld { islands, bodies, .. } = &mut self.engine;
+        let is_free = |&handle: &RigidBodyHandle| Some(handle) != held && bodies[handle].is_dynamic();
+        let awake: Vec<RigidBodyHandle> = islands.active_bodies().filter(is_free).collect();
+        if awake.iter().all(|&handle| bodies[handle].linvel().length() < JITTER_M_PER_S) {
+            awake.into_iter().for_each(|handle| bodies[handle].sleep());
+        }
+    }
+
+    /// Length of a step.
+    pub(super) fn step_secs(&self) -> f32 {
+        self.engine.integration_parameters.dt
+    }
+
+    /// The force that a joint took in the last step, in newtons.
+    pub(super) fn joint_force_n(&self, joint: ImpulseJointHandle) -> f32 {
+        let parameters = &self.engine.integration_parameters;
+        let substep_secs = parameters.dt / parameters.num_solver_iterations as f32;
+        let impulses = self.engine.impulse_joints.get(joint).map_or([0.0; 6], |joint| joint.impulses);
+        Vector::new(impulses[0], impulses[1], impulses[2]).length() / substep_secs
+    }
+
     /// Height of the highest point of all bodies but `except`, at least the table's.
     pub(super) fn top_z(&self, except: Option<RigidBodyHandle>) -> f32 {
         let others = self.bodies.iter().filter(|&&handle| Some(handle) != except);
@@ -137,7 +159,7 @@ impl World {
         Some(Hit { body: self.owner(collider), distance_m })
     }
 
-    /// The first thing that a shape meets on the way along `path`.
+    /// How far a shape can move along `path` before it meets something; `None` when it meets nothing.
     pub(super) fn cast(
         &self,
         shape: &dyn EngineShape,
@@ -145,19 +167,14 @@ impl World {
         path: Vector,
         at_start: AtStart,
         except: Option<RigidBodyHandle>,
-    ) -> Option<Hit> {
-        let length = path.length();
-        if length <= 0.0 {
-            return None;
-        }
-        let options = ShapeCastOptions {
-            max_time_of_impact: length,
-            stop_at_penetration: at_start == AtStart::Stops,
-            compute_impact_geometry_on_penetration: false,
-            ..ShapeCastOptions::default()
-        };
-        let (collider, hit) = self.queries(except).cast_shape(from, path / length, shape, options)?;
-        Some(Hit { body: self.owner(collider), distance_m: hit.time_of_impact })
+    ) -> Option<f32> {
+        let start = shape.compute_aabb(from);
+        let swept = start.merged(&start.translated(path));
+        let queries = self.queries(except);
+        let near = queries.intersect_aabb_conservative(swept).map(|(_, collider)| collider);
+        near.filter(|collider| collider.compute_aabb().intersects(&swept))
+            .filter_map(|collider| sweep::free_way_m(shape, from, path, collider, at_start))
+            .min_by(f32::total_cmp)
     }
 
     fn queries(&self, except: Option<RigidBodyHandle>) -> QueryPipeline<'_> {
@@ -184,7 +201,7 @@ fn tune(engine: &mut PhysicsWorld, config: &SimulationConfig) {
     parameters.contact_softness = contact;
     parameters.static_contact_softness = contact;
     parameters.normalized_prediction_distance = PREDICTION_M;
-    parameters.normalized_allowed_linear_error = 0.000_2;
+    parameters.normalized_allowed_linear_error = SLOP_M;
     parameters.normalized_contact_recycle_distance = RECYCLE_M;
     // Nothing here moves more than a few millimetres a step.
     parameters.max_ccd_substeps = 0;
@@ -209,11 +226,11 @@ fn add_body(engine: &mut PhysicsWorld, scene: &Scene, index: BodyIndex, in_world
         Mobility::Movable => RigidBodyBuilder::dynamic(),
         Mobility::Fixed => RigidBodyBuilder::fixed(),
     };
-    let builder = match body.shape {
-        Shape::Ball { .. } => builder.angular_damping(BALL_ANGULAR_DAMPING),
-        _ => builder,
+    let angular_damping = match body.shape {
+        Shape::Ball { .. } => BALL_ANGULAR_DAMPING,
+        _ => ANGULAR_DAMPING,
     };
-    let mut rigid_body = builder.pose(to_engine(in_world)).build();
+    let mut rigid_body = builder.angular_damping(angular_damping).pose(to_engine(in_world)).build();
     let rest = rigid_body.activation_mut();
     rest.normalized_linear_threshold = REST_M_PER_S;
     rest.time_until_sleep = REST_SECS;

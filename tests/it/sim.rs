@@ -1,132 +1,207 @@
-//! The world in physics.
+//! The world in physics: motions, grasps, falls, piles, and that all of it repeats to the bit.
 
-use ntp::expert::demonstrate;
-use ntp::geometry::{Vec3, upright};
-use ntp::robot::{Action, GRASP_M, HOVER_M, RobotApi};
-use ntp::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape, Slot, SlotIndex, lies_in_any_container};
-use ntp::seed::Seed;
+mod contract;
+mod rates;
+mod table;
+
+use ntp::geometry::horizontal_distance;
+use ntp::robot::{Action, GRASP_M, HOVER_M, RobotApi as _};
+use ntp::scene::{BodyIndex, Scene, SlotIndex};
 use ntp::sim::{SimError, Simulation, SimulationConfig};
-use ntp::task::{Condition, Family, Goal, Split, Task, Trial, initial_state, scene};
-use ntp::trace::{Actor, Cause, Outcome, Provenance};
-use rand::Rng as _;
-use rand::seq::SliceRandom as _;
+use ntp::trace::Cause;
 
-/// Towers of 2 to 4 blocks, each built bottom-up.
-fn random_stacking_task(seed: Seed) -> Task {
-    let mut rng = seed.rng();
-    let mut blocks: Vec<u16> = (0..8).collect();
-    blocks.shuffle(&mut rng);
-    let mut goals = Vec::new();
-    let n_goals = rng.random_range(3..=6);
-    let mut rest = blocks.as_slice();
-    while goals.len() < n_goals && rest.len() >= 2 {
-        let height = rng.random_range(2..=4).min(rest.len());
-        let (tower, others) = rest.split_at(height);
-        goals.extend(tower.windows(2).map(|pair| Goal { source: SlotIndex(pair[1]), target: SlotIndex(pair[0]) }));
-        rest = others;
+use table::{BLOCK, Table, pick_and_place};
+
+const PICK_FIRST: [Action; 2] = [Action::MoveTo(SlotIndex(0)), Action::Grip];
+
+#[track_caller]
+fn act_all(world: &mut Simulation, actions: &[Action]) {
+    for &action in actions {
+        assert_eq!(world.act(action), Ok(()), "{action:?}");
     }
-    let conditions = goals.iter().map(|goal| Condition::OnTop { upper: goal.source, lower: goal.target }).collect();
-    Task { id: format!("random_{}", seed.0), family: Family::BlockStacking, goals, conditions, split: Split::Seen }
-}
-
-fn world(family: Family, counts: &[u16], seed: Seed) -> Simulation {
-    let scene = scene(family, counts);
-    let initial = initial_state(family, &scene, seed);
-    Simulation::new(scene, &initial, &SimulationConfig::default()).unwrap()
 }
 
 #[test]
-fn probe_stacking() {
-    let n: u64 = std::env::var("PROBE_N").ok().and_then(|n| n.parse().ok()).unwrap_or(20);
-    let start = cpu_time::ProcessTime::now();
-    let mut failures = Vec::new();
-    let mut n_goals = 0;
-    let mut n_frames = 0;
-    let mut secs = 0.0;
-    for index in 0..n {
-        let task = random_stacking_task(Seed(index));
-        n_goals += task.goals.len();
-        let trial = Trial { index: 0, counts: Vec::new(), seed: Seed(index).derive("trial", &[]) };
-        let mut world = world(task.family, &[], trial.seed);
-        let episode = demonstrate(&task, &mut world, Provenance::new(&task, &trial, Actor::Expert, index)).unwrap();
-        n_frames += episode.frames.len();
-        secs += episode.frames.last().unwrap().time_nanos as f64 * 1e-9;
-        if episode.outcome != Outcome::Success {
-            failures.push((index, episode.outcome, episode.frames.iter().filter(|f| f.boundary).count()));
-        }
+fn a_tower_of_eight_is_as_high_as_its_blocks() {
+    let mut table = Table::default();
+    for column in 0..8_u16 {
+        table.add(&format!("block_{column}"), BLOCK, [-0.28 + 0.08 * f32::from(column), 0.0]);
     }
-    let cpu = start.elapsed().as_secs_f64();
-    eprintln!(
-        "stacking: {n} demos, {} failures {failures:?}, {:.2} ms/demo, {:.2} goals, {:.1} frames, {:.2} s",
-        failures.len(),
-        1e3 * cpu / n as f64,
-        n_goals as f64 / n as f64,
-        n_frames as f64 / n as f64,
-        secs / n as f64
-    );
-}
-
-#[test]
-fn probe_sorting() {
-    let n: u64 = std::env::var("PROBE_N").ok().and_then(|n| n.parse().ok()).unwrap_or(4) / 4;
-    let start = cpu_time::ProcessTime::now();
-    let mut failures = Vec::new();
-    for index in 0..n {
-        let mut rng = Seed(index).derive("map", &[]).rng();
-        let one: bool = index % 2 == 0;
-        let first = rng.random_range(0..4);
-        let mapping = std::array::from_fn(|_| if one { first } else { rng.random_range(0..4) });
-        let task = crate::kinematic::sorting("map", mapping, Split::Seen);
-        let trial = Trial { index: 0, counts: vec![10; 4], seed: Seed(index).derive("trial", &[]) };
-        let mut world = world(task.family, &trial.counts, trial.seed);
-        let episode = demonstrate(&task, &mut world, Provenance::new(&task, &trial, Actor::Expert, index)).unwrap();
-        if episode.outcome != Outcome::Success {
-            failures.push((index, episode.outcome, episode.frames.iter().filter(|f| f.boundary).count()));
-        }
-    }
-    let cpu = start.elapsed().as_secs_f64();
-    eprintln!("sorting: {n} demos, {} failures {failures:?}, {:.2} ms/demo", failures.len(), 1e3 * cpu / n as f64);
-}
-
-#[test]
-fn probe_tower() {
-    let shape = Shape::Cuboid { half_extents_m: [0.025; 3] };
-    let body = |name: String| Body { name, shape, mobility: Mobility::Movable, color: [0; 3] };
-    let bodies: Vec<Body> = (0..8).map(|i| body(format!("b{i}"))).collect();
-    let slots =
-        bodies.iter().enumerate().map(|(i, b)| Slot { name: b.name.clone(), bodies: vec![BodyIndex(i as u16)] });
-    let scene = Scene { slots: slots.collect(), bodies, table_half_m: [0.4; 2] };
-    let position = |i: usize| Vec3::new(-0.28 + 0.08 * i as f32, 0.0, 0.025);
-    let initial = SceneState {
-        gripper_in_world: upright(Vec3::new(0.0, 0.2, 0.3), 0.0),
-        opening_m: 0.07,
-        held: None,
-        bodies_in_world: (0..8).map(|i| upright(position(i), 0.0)).collect(),
-    };
-    let mut world = Simulation::new(scene, &initial, &SimulationConfig::default()).unwrap();
+    let mut world = table.world();
+    let base = world.state().bodies_in_world[0].translation.vector;
     for upper in 1..8 {
-        for action in
-            [Action::MoveTo(SlotIndex(upper)), Action::Grip, Action::MoveTo(SlotIndex(upper - 1)), Action::Release]
-        {
-            let acted = world.act(action);
-            eprintln!(
-                "{upper} {action:?} {acted:?} {:?}",
-                world.state().body_in_world(BodyIndex(upper)).translation.vector
-            );
-        }
-    }
-    for f in world.frames() {
-        eprintln!(
-            "{} {} {:?} {}",
-            f.time_nanos as f64 * 1e-9,
-            f.boundary,
-            f.state.gripper_in_world.translation.vector,
-            f.state.opening_m
-        );
+        act_all(&mut world, &pick_and_place(upper, upper - 1));
     }
     let state = world.settle();
-    for i in 0..8 {
-        let p = state.bodies_in_world[i].translation.vector;
-        eprintln!("{i}: dx {:.5} dy {:.5} dz {:.5}", p.x - position(0).x, p.y, p.z - 0.025 - 0.05 * i as f32);
+    for (level, pose) in state.bodies_in_world.iter().enumerate() {
+        let error_m = pose.translation.vector.z - (0.025 + 0.05 * level as f32);
+        assert!(error_m.abs() < 0.001, "block {level} is {error_m} m off its height");
+        assert!(horizontal_distance(&pose.translation.vector, &base) < 0.002, "block {level} leans");
+    }
+}
+
+#[test]
+fn move_to_ends_above_the_body_and_grip_two_centimetres_above_its_centre() {
+    let mut world = Table::default().with("block", BLOCK, [0.1, -0.1]).world();
+    let block = world.state().bodies_in_world[0].translation.vector;
+    act_all(&mut world, &PICK_FIRST[..1]);
+    let above = world.state().gripper_in_world.translation.vector - block;
+    assert!(horizontal_distance(&above, &Default::default()) < 1e-4 && (above.z - HOVER_M).abs() < 1e-4);
+    act_all(&mut world, &PICK_FIRST[1..]);
+    let state = world.state();
+    assert_eq!(state.held, Some(BodyIndex(0)));
+    let held = state.gripper_in_world.translation.vector - state.bodies_in_world[0].translation.vector;
+    assert!((held.z - GRASP_M).abs() < 1e-3);
+    assert!((state.opening_m - 0.05).abs() < 0.001, "the fingers touch the block, {} m apart", state.opening_m);
+}
+
+#[test]
+fn the_fingers_close_on_air_where_nothing_lies() {
+    let mut world = Table::default().with("block", BLOCK, [0.2, 0.2]).gripper([-0.1, 0.0, 0.3]).world();
+    assert_eq!(world.act(Action::Grip), Err(Cause::MissedGrasp));
+    let state = world.state();
+    assert_eq!(state.held, None);
+    assert!((state.opening_m - 0.07).abs() < 1e-6, "the fingers are open again");
+    assert!(state.gripper_in_world.translation.vector.z < 0.05, "it did go down");
+    act_all(&mut world, &PICK_FIRST);
+}
+
+#[test]
+fn only_what_is_between_the_fingers_is_grasped() {
+    // Beside the middle along the fingers' closing: pulled there and grasped.
+    let mut world = Table::default().with("block", BLOCK, [0.0, 0.0]).gripper([0.0, 0.006, 0.3]).world();
+    assert_eq!(world.act(Action::Grip), Ok(()));
+    let state = world.state();
+    assert!((state.bodies_in_world[0].translation.vector.y - 0.006).abs() < 0.002);
+    // So far beside it that a finger would come down on the block.
+    let mut world = Table::default().with("block", BLOCK, [0.0, 0.0]).gripper([0.0, 0.02, 0.3]).world();
+    let before = world.state().bodies_in_world[0];
+    assert_eq!(world.act(Action::Grip), Err(Cause::MissedGrasp));
+    let moved = world.settle().bodies_in_world[0].translation.vector - before.translation.vector;
+    assert!(moved.norm() < 1e-3, "the block is not pushed into the table");
+    // At the block's end along the fingers' flat sides.
+    let mut world = Table::default().with("block", BLOCK, [0.0, 0.0]).gripper([0.02, 0.0, 0.3]).world();
+    assert_eq!(world.act(Action::Grip), Err(Cause::MissedGrasp));
+    // Too wide for the fingers.
+    let wide = ntp::scene::Shape::Cuboid { half_extents_m: [0.04; 3] };
+    let mut world = Table::default().with("crate", wide, [0.0, 0.0]).world();
+    assert_eq!(world.act(PICK_FIRST[0]), Ok(()));
+    assert_eq!(world.act(PICK_FIRST[1]), Err(Cause::MissedGrasp));
+}
+
+#[test]
+fn a_turned_block_is_gripped_at_its_sides_and_set_down_straight() {
+    for yaw_rad in [0.4, -0.7, 1.2] {
+        let mut world =
+            Table::default().with("block", BLOCK, [0.0, 0.1]).turned(yaw_rad).with("base", BLOCK, [0.1, 0.0]).world();
+        act_all(&mut world, &pick_and_place(0, 1));
+        let yaw = ntp::geometry::yaw_rad(&world.settle().bodies_in_world[0]).rem_euclid(std::f32::consts::FRAC_PI_2);
+        let off = yaw.min(std::f32::consts::FRAC_PI_2 - yaw);
+        assert!(off < 0.02, "a block turned by {yaw_rad} rad is set down {off} rad off");
+    }
+}
+
+#[test]
+fn a_carried_block_passes_above_a_tower_in_its_way() {
+    let mut table = Table::default().with("carried", BLOCK, [-0.2, 0.0]).with("target", BLOCK, [0.2, 0.0]);
+    for level in 0..4 {
+        table.add_at(&format!("level_{level}"), BLOCK, [0.0, 0.0, 0.025 + 0.05 * level as f32]);
+    }
+    let (scene, initial) = table.parts();
+    let config = SimulationConfig { frame_hz: 100, ..SimulationConfig::default() };
+    let mut world = Simulation::new(scene, &initial, &config).unwrap();
+    let tower = world.state().bodies_in_world[2..].to_vec();
+    act_all(&mut world, &pick_and_place(0, 1));
+    let over = |frame: &&ntp::trace::Frame| frame.state.bodies_in_world[0].translation.vector.x.abs() < 0.05;
+    let over: Vec<_> = world.frames().iter().filter(over).collect();
+    assert!(!over.is_empty(), "the way leads over the tower");
+    assert!(over.iter().all(|frame| frame.state.bodies_in_world[0].translation.vector.z - 0.025 > 0.2));
+    for (before, after) in tower.iter().zip(&world.settle().bodies_in_world[2..]) {
+        assert!((before.translation.vector - after.translation.vector).norm() < 1e-4);
+    }
+}
+
+#[test]
+fn a_tower_that_an_action_topples_is_named() {
+    // The upper two are nearly out of balance; one more on the outer one is too much.
+    let mut world = Table::default()
+        .with("carried", BLOCK, [0.2, 0.2])
+        .at("lower", BLOCK, [0.0, 0.0, 0.025])
+        .at("upper", BLOCK, [0.013, 0.0, 0.075])
+        .at("outer", BLOCK, [0.0355, 0.0, 0.125])
+        .world();
+    assert_eq!(world.act(PICK_FIRST[0]), Ok(()));
+    assert_eq!(world.act(PICK_FIRST[1]), Ok(()));
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(3))), Ok(()));
+    assert_eq!(world.act(Action::Release), Err(Cause::KnockedTower));
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()), "it is told once, and the world goes on");
+}
+
+#[test]
+fn what_falls_off_the_table_is_named() {
+    // Gripped off its centre, the block is set down on a post near the edge with its weight on the outer side.
+    let post = ntp::scene::Shape::Cuboid { half_extents_m: [0.006, 0.02, 0.02] };
+    let mut world = Table::default()
+        .with("block", BLOCK, [0.0, 0.0])
+        .with("post", post, [0.393, 0.0])
+        .gripper([-0.013, 0.0, 0.3])
+        .world();
+    assert_eq!(world.act(Action::Grip), Ok(()));
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
+    assert_eq!(world.act(Action::Release), Err(Cause::ObjectOffTable));
+    let state = world.settle();
+    assert!(state.bodies_in_world[0].translation.vector.z < -0.2, "it lies on the ground");
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
+}
+
+#[test]
+fn a_beam_that_stands_out_on_both_sides_is_carried() {
+    let beam = ntp::scene::Shape::Cuboid { half_extents_m: [0.1, 0.03, 0.03] };
+    let mut world = Table::default().with("beam", beam, [0.0, 0.0]).with("block", BLOCK, [0.0, 0.2]).world();
+    act_all(&mut world, &PICK_FIRST);
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
+    assert_eq!(world.state().held, Some(ntp::scene::BodyIndex(0)));
+}
+
+#[track_caller]
+fn check_refused(table: Table, expected: &str) {
+    let (scene, initial) = table.parts();
+    let error = Simulation::new(scene, &initial, &SimulationConfig::default()).err().unwrap();
+    assert!(error.to_string().contains(expected), "{error}");
+}
+
+#[test]
+fn starts_that_make_no_sense_are_refused_by_name() {
+    let two = || Table::default().with("red", BLOCK, [0.0, 0.0]);
+    check_refused(two().with("blue", BLOCK, [0.04, 0.0]), "red and blue overlap");
+    check_refused(two().with("blue", BLOCK, [0.45, 0.0]), "blue starts at [0.45");
+    check_refused(two().at("blue", BLOCK, [0.2, 0.0, 0.01]), "table and blue overlap");
+    check_refused(two().gripper([0.0, 0.03, 0.06]), "gripper and red overlap");
+    check_refused(two().at("blue", BLOCK, [f32::NAN, 0.0, 0.1]), "blue: its pose is not finite");
+    check_refused(two().with("blue", ntp::scene::Shape::Ball { radius_m: 0.0 }, [0.2, 0.0]), "blue: every size");
+    let (mut scene, mut initial) = two().parts();
+    initial.held = Some(BodyIndex(0));
+    let held = Simulation::new(scene.clone(), &initial, &SimulationConfig::default()).err();
+    assert_eq!(held, Some(SimError::HeldAtStart { name: "red".to_owned() }));
+    initial.held = None;
+    scene.slots[0].bodies.clear();
+    let slot = Simulation::new(scene, &initial, &SimulationConfig::default()).err();
+    assert_eq!(slot, Some(SimError::Slot { name: "red".to_owned(), bodies: Vec::new() }));
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let (scene, initial) = Table::default().with("red", BLOCK, [0.0, 0.0]).parts();
+    let fine = SimulationConfig::default;
+    let wrong = [
+        (SimulationConfig { step_hz: 0, ..fine() }, "simulation.step_hz is 0"),
+        (SimulationConfig { frame_hz: 300, ..fine() }, "simulation.frame_hz is 300"),
+        (SimulationConfig { speed_m_per_s: f32::NAN, ..fine() }, "simulation.speed_m_per_s is NaN"),
+        (SimulationConfig { acceleration_m_per_s2: -1.0, ..fine() }, "simulation.acceleration_m_per_s2 is -1"),
+        (SimulationConfig { settle_limit_secs: 0.0, ..fine() }, "simulation.settle_limit_secs is 0"),
+    ];
+    for (config, expected) in wrong {
+        let error = Simulation::new(Scene::clone(&scene), &initial, &config).err().unwrap();
+        assert!(error.to_string().contains(expected), "{error}");
     }
 }
