@@ -34,12 +34,14 @@ mod container;
 mod error;
 mod index;
 mod inspect;
+mod observation;
 mod reader;
 mod schema;
 mod start;
 mod stream;
 mod transform;
 mod viewer;
+mod wire;
 mod writer;
 
 pub use error::{Damage, EpisodeProblem, MessageProblem, RecordingError};

@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::McapError;
 use mcap::records::{ChunkIndex, MessageIndex, Record, Statistics, op};
 
-use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary, crc32};
+use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{Damage, RecordingError};
 use super::schema::{SCHEMA_VERSION, Topic};
 use super::stream::damaged;
@@ -237,7 +237,7 @@ fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Resu
     let content = read_record(path, file, size, place, (op::ATTACHMENT, "attachment"))?;
     let broken = || broken(path, place.0, "attachment");
     let (checked, checksum) = content.split_last_chunk().ok_or_else(broken)?;
-    let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32(checked));
+    let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32fast::hash(checked));
     if saved != calculated {
         return Err(damaged(path, place.0, McapError::BadAttachmentCrc { saved, calculated }));
     }

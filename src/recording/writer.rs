@@ -21,7 +21,7 @@ use super::calls::{self, Step};
 use super::container::{MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{EpisodeProblem, RecordingError};
 use super::schema::{SCHEMA_VERSION, Topic, proto};
-use super::{start, transform, viewer};
+use super::{observation, start, transform, viewer};
 use crate::artifact::{AtomicFile, IoError};
 use crate::geometry::Pose;
 use crate::program::{Program, vocabulary_hash};
@@ -238,7 +238,7 @@ impl Sink {
         let written = self.put_bytes(Topic::Transforms, log_time_nanos, &buffer);
         self.buffer = buffer;
         written?;
-        self.put(Topic::Observation, log_time_nanos, &encode_observation(position, frame))
+        self.put(Topic::Observation, log_time_nanos, &observation::encode(position, frame))
     }
 
     fn step(
@@ -340,19 +340,6 @@ fn bits(pose: &Pose) -> [u32; 7] {
     let [x, y, z] = pose.translation.vector.into();
     let [i, j, k, w] = pose.rotation.coords.into();
     [x, y, z, i, j, k, w].map(f32::to_bits)
-}
-
-fn encode_observation(position: u32, frame: &Frame) -> proto::Observation {
-    let Frame { time_nanos: _, boundary, state, slots } = frame;
-    let slot_positions_m = if *boundary { frame.observation().slots_m.into_flattened() } else { Vec::new() };
-    proto::Observation {
-        frame: position,
-        boundary: *boundary,
-        opening_m: state.opening_m,
-        held: state.held.map(|body| u32::from(body.0)),
-        slots: slots.iter().map(|body| u32::from(body.0)).collect(),
-        slot_positions_m,
-    }
 }
 
 fn encode_end(episode: &Episode) -> proto::EpisodeEnd {
