@@ -37,7 +37,9 @@ pub(super) const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
 /// How far a held body may shift before it counts as lost, in metres.
 const SLIP_M: f32 = 0.005;
 /// The most that the fingers hold, in newtons. A block weighs 0.6.
-const GRIP_N: f32 = 15.0;
+const GRIP_N: f32 = 10.0;
+/// For how long: what the fingers pressed into the table resists for a few steps.
+const OVERLOAD_SECS: f32 = 0.03;
 
 /// A body in the grasp.
 #[derive(Clone, Copy)]
@@ -46,6 +48,8 @@ pub(super) struct Held {
     pub(super) handle: RigidBodyHandle,
     pub(super) in_gripper: EnginePose,
     joint: ImpulseJointHandle,
+    /// How long it has pulled harder than the fingers hold.
+    overloaded_secs: f32,
 }
 
 /// Whether the engine's gripper is where the tool is.
@@ -151,7 +155,7 @@ impl Gripper {
         // What the fingers' push left it with must not be set free when it is let go.
         stop(&mut world.engine.bodies[handle]);
         let in_gripper = self.tool.in_world().inv_mul(&world.in_world(body));
-        self.held = Some(Held { body, handle, in_gripper, joint });
+        self.held = Some(Held { body, handle, in_gripper, joint, overloaded_secs: 0.0 });
     }
 
     /// Lets go. The body does not touch the gripper until [`Gripper::part_from`].
@@ -169,13 +173,18 @@ impl Gripper {
         world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, Group::ALL));
     }
 
-    /// Whether what is held is torn out of the grasp: it pulls harder than the fingers hold, or it has shifted.
-    pub(super) fn has_slipped(&self, world: &World) -> bool {
-        self.held.is_some_and(|held| {
-            let now = self.tool.in_world().inv_mul(&world.in_world(held.body));
-            let shift_m = (now.translation - held.in_gripper.translation).length();
-            shift_m > SLIP_M || world.joint_force_n(held.joint) > GRIP_N
-        })
+    /// After a step of the engine: whether what is held was torn out of the grasp, because it has shifted or because
+    /// it has pulled harder than the fingers hold.
+    pub(super) fn has_slipped(&mut self, world: &World) -> bool {
+        let tool_in_world = self.tool.in_world();
+        let Some(held) = &mut self.held else {
+            return false;
+        };
+        let now = tool_in_world.inv_mul(&world.in_world(held.body));
+        let is_overloaded = world.joint_force_n(held.joint) > GRIP_N;
+        held.overloaded_secs = if is_overloaded { held.overloaded_secs + world.step_secs() } else { 0.0 };
+        let shift_m = (now.translation - held.in_gripper.translation).length();
+        shift_m > SLIP_M || held.overloaded_secs > OVERLOAD_SECS
     }
 
     /// Distance from each finger to a body, in metres; 0 when they touch.

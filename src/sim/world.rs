@@ -132,6 +132,11 @@ impl World {
         }
     }
 
+    /// Length of a step.
+    pub(super) fn step_secs(&self) -> f32 {
+        self.engine.integration_parameters.dt
+    }
+
     /// The force that a joint took in the last step, in newtons.
     pub(super) fn joint_force_n(&self, joint: ImpulseJointHandle) -> f32 {
         let parameters = &self.engine.integration_parameters;
