@@ -41,7 +41,20 @@ impl CallRows {
     /// What the schema text cannot say of this table.
     pub(crate) fn options() -> WriteOptions {
         WriteOptions {
-            delta_encoded: vec!["episode_index", "call_id", "input_begin", "input_end", "frame_begin", "frame_end"],
+            delta_encoded: vec![
+                "episode_index",
+                "call_id",
+                "caller_id",
+                "depth",
+                "step",
+                "argument_slot",
+                "input_begin",
+                "input_end",
+                "output_begin",
+                "output_end",
+                "frame_begin",
+                "frame_end",
+            ],
             sorted_by: vec!["episode_index", "call_id"],
             ..WriteOptions::default()
         }
@@ -118,7 +131,7 @@ impl ScopeRows {
     pub(crate) fn options() -> WriteOptions {
         WriteOptions {
             delta_encoded: vec!["episode_index", "call_id", "specification_frame"],
-            sorted_by: vec!["episode_index", "call_id", "specification_frame"],
+            sorted_by: vec!["episode_index", "call_id"],
             ..WriteOptions::default()
         }
     }

@@ -9,7 +9,7 @@ use arrow::error::ArrowError;
 
 use crate::dataset::episode_view::{EpisodeView, is_own_specification};
 use crate::dataset::layout::FilePlace;
-use crate::table::Column;
+use crate::table::{Column, WriteOptions};
 
 /// Where the rows of an episode are.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +142,11 @@ pub(crate) struct MetaRows {
 }
 
 impl MetaRows {
+    /// What the schema text cannot say of this table.
+    pub(crate) fn options() -> WriteOptions {
+        WriteOptions { sorted_by: vec!["episode_index"], ..WriteOptions::default() }
+    }
+
     pub(crate) fn n_rows(&self) -> usize {
         self.episode_index.len()
     }

@@ -81,6 +81,11 @@ impl Feature {
         }
     }
 
+    /// Whether each episode has statistics of its own: those that a robot learner takes in, and the numbers of rows.
+    pub(crate) fn has_episode_statistics(&self) -> bool {
+        self.is_numeric() && !self.name.starts_with("ntp.") && !self.name.starts_with("next.")
+    }
+
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
         self.dtype != Dtype::String

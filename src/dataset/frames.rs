@@ -2,7 +2,6 @@
 //!
 //! Rows of several episodes are gathered until they are worth a row group; then the buffers begin anew.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow::array::{
@@ -12,7 +11,7 @@ use arrow::datatypes::{DataType, Field};
 use arrow::error::ArrowError;
 
 use crate::dataset::episode_view::EpisodeView;
-use crate::dataset::feature::{ACTION_NAMES, FEATURES, Width};
+use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
 use crate::dataset::statistics::Numbers;
 use crate::dataset::text::TextTable;
 use crate::program::Program;
@@ -93,9 +92,10 @@ impl FrameRows {
         let vectors = FEATURES.iter().filter(|feature| feature.width != Width::Scalar);
         WriteOptions {
             list_lengths: vectors.map(|feature| (feature.name, feature.width(n_slots) as i32)).collect(),
-            delta_encoded: vec!["frame_index", "episode_index", "index", "ntp.recording_frame"],
+            plain: vec!["timestamp", "ntp.time_secs"],
+            delta_encoded: FEATURES.iter().filter(|of| of.dtype == Dtype::Int64).map(|of| of.name).collect(),
             sorted_by: vec!["episode_index", "frame_index"],
-            metadata: Vec::new(),
+            ..WriteOptions::default()
         }
     }
 
@@ -114,7 +114,8 @@ impl FrameRows {
             self.time_secs.push(frame.time_nanos as f64 * 1e-9);
             self.boundary.push(frame.boundary);
             self.recording_frame.push(i64::from(recorded));
-            self.gripper.extend(frame.state.gripper_in_world.translation.vector.iter());
+            let gripper = frame.state.gripper_in_world.translation.vector;
+            self.gripper.extend_from_slice(&[gripper.x, gripper.y, gripper.z]);
         }
         let n_after = self.index.len();
         self.episode_index.resize(n_after, ids.episode_index);
@@ -129,8 +130,9 @@ impl FrameRows {
         for row in first..first + n_rows {
             let next = (row + 1).min(first + n_rows - 1);
             let (here, there) = (POSITION_WIDTH * row, POSITION_WIDTH * next);
-            self.action.extend((0..POSITION_WIDTH).map(|axis| self.gripper[there + axis] - self.gripper[here + axis]));
-            self.action.push(self.state[closed_at(next)]);
+            let [from, to] = [here, there].map(|at| &self.gripper[at..at + POSITION_WIDTH]);
+            let closed = self.state[closed_at(next)];
+            self.action.extend_from_slice(&[to[0] - from[0], to[1] - from[1], to[2] - from[2], closed]);
         }
     }
 
@@ -139,15 +141,17 @@ impl FrameRows {
         let first = self.call_id.len();
         let calls = &view.episode.calls;
         let root = calls[0].program;
-        let root_path = self.paths.key(None, root);
+        let root_path = self.paths.root(root);
         let root_text = i64::from(self.subtasks.key(root.name()));
         self.call_id.resize(first + view.n_rows(), 0);
         self.program.resize(first + view.n_rows(), root_path);
         self.subtask_index.resize(first + view.n_rows(), root_text);
         self.paths.of_call.clear();
         for (position, (call, spans)) in calls.iter().zip(view.spans).enumerate() {
-            let caller = call.caller.map(|caller| self.paths.of_call[caller.0 as usize]);
-            let path = self.paths.key(caller, call.program);
+            let path = match call.caller {
+                None => root_path,
+                Some(caller) => self.paths.callee(self.paths.of_call[caller.0 as usize], call.program),
+            };
             self.paths.of_call.push(path);
             let rows = first + spans.frames.begin as usize..first + spans.frames.last() as usize;
             if call.depth > 0 && !rows.is_empty() {
@@ -212,10 +216,10 @@ fn append_state(flat: &mut Vec<f32>, frame: &Frame) {
     let gripper = frame.state.gripper_in_world.translation.vector;
     for &body in &frame.slots {
         let position = frame.state.body_in_world(body).translation.vector - gripper;
-        flat.extend(position.iter());
+        flat.extend_from_slice(&[position.x, position.y, position.z]);
     }
     let closed = f32::from(u8::from(frame.state.held.is_some()));
-    flat.extend([1.0 - closed, closed]);
+    flat.extend_from_slice(&[1.0 - closed, closed]);
 }
 
 /// A call of the root with the slots that are moved to below it, in order of first use.
@@ -236,19 +240,25 @@ fn subtask_text(view: &EpisodeView<'_>, position: usize) -> String {
 #[derive(Default)]
 struct Paths {
     texts: TextTable,
-    keys: HashMap<(Option<i32>, Program), i32>,
+    /// By the key of the caller's path, the keys of the paths of what it calls.
+    callees: Vec<[Option<i32>; Program::ALL.len()]>,
     of_call: Vec<i32>,
 }
 
 impl Paths {
-    fn key(&mut self, caller: Option<i32>, program: Program) -> i32 {
-        let texts = &mut self.texts;
-        *self.keys.entry((caller, program)).or_insert_with(|| match caller {
-            None => texts.key(program.name()),
-            Some(caller) => {
-                let path = format!("{}/{program}", texts.texts()[caller as usize]);
-                texts.key(&path)
-            }
+    fn root(&mut self, program: Program) -> i32 {
+        self.texts.key(program.name())
+    }
+
+    fn callee(&mut self, caller: i32, program: Program) -> i32 {
+        let caller = caller as usize;
+        if self.callees.len() <= caller {
+            self.callees.resize(caller + 1, [None; Program::ALL.len()]);
+        }
+        let known = &mut self.callees[caller][program.index()];
+        *known.get_or_insert_with(|| {
+            let path = format!("{}/{program}", self.texts.texts()[caller]);
+            self.texts.key(&path)
         })
     }
 }

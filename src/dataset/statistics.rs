@@ -1,13 +1,14 @@
 //! Statistics of the numeric features: of each episode while it is written, and of the whole dataset, exactly.
 //!
-//! Minimum, maximum, mean and deviation of the whole are merged from the episodes'. Quantiles cannot be merged: they are
-//! selected from the written files, see [`quantile`]. `LeRobot` samples and takes an envelope instead; ours are exact.
+//! Mean and deviation of the whole are merged from the episodes'. Quantiles cannot be merged: the values are kept in a
+//! temporary file and selected from it, see [`quantile`]. `LeRobot` samples and takes an envelope instead.
 //!
 //! Deviation is that of the population, quantiles are interpolated linearly between the two nearest values.
 
+mod key;
 mod quantile;
+mod spool;
 
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,13 +18,16 @@ use arrow::datatypes::Field;
 use arrow::error::ArrowError;
 use serde::{Deserialize, Serialize};
 
+use crate::artifact::IoError;
 use crate::dataset::feature::{FEATURES, Feature};
-use crate::table::TableError;
 
-use quantile::Selector;
+pub(crate) use key::Numbers;
+use key::{key_bytes, value_of};
+use quantile::{Place, Selector};
+use spool::Spool;
 
 /// The quantiles, each with its name.
-pub(crate) const QUANTILES: [(&str, f64); 5] = [("q01", 0.01), ("q10", 0.1), ("q50", 0.5), ("q90", 0.9), ("q99", 0.99)];
+const QUANTILES: [(&str, f64); 5] = [("q01", 0.01), ("q10", 0.1), ("q50", 0.5), ("q90", 0.9), ("q99", 0.99)];
 
 /// Statistics of one feature as `meta/stats.json` has them, a value per dimension. `count` is one number in a list.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,46 +44,23 @@ pub(crate) struct FeatureStatistics {
     pub(crate) q99: Vec<f64>,
 }
 
-/// The values of a numeric column, those of one row after another.
-#[derive(Clone, Copy)]
-pub(crate) enum Numbers<'a> {
-    Float32(&'a [f32]),
-    Float64(&'a [f64]),
-    Int64(&'a [i64]),
-    Boolean(&'a [bool]),
-}
-
-impl Numbers<'_> {
-    /// One dimension of some rows. Zeros lose their sign, so that order and equality agree.
-    fn copy_dimension(self, rows: Range<usize>, dimension: usize, width: usize, values: &mut Vec<f64>) {
-        values.clear();
-        let at = rows.map(|row| row * width + dimension);
-        match self {
-            Self::Float32(all) => values.extend(at.map(|at| f64::from(all[at]) + 0.0)),
-            Self::Float64(all) => values.extend(at.map(|at| all[at] + 0.0)),
-            Self::Int64(all) => values.extend(at.map(|at| all[at] as f64)),
-            Self::Boolean(all) => values.extend(at.map(|at| f64::from(u8::from(all[at])))),
-        }
-    }
-}
-
 /// Count, mean and sum of squared deviations of one dimension, and its range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     count: u64,
     mean: f64,
     squares: f64,
-    min: f64,
-    max: f64,
+    min_key: u64,
+    max_key: u64,
 }
 
 impl Moments {
-    /// Of some values, which are sorted.
-    fn of(sorted: &[f64]) -> Self {
-        let count = sorted.len();
-        let mean = sorted.iter().sum::<f64>() / count as f64;
-        let squares = sorted.iter().map(|value| (value - mean) * (value - mean)).sum();
-        Self { count: count as u64, mean, squares, min: sorted[0], max: sorted[count - 1] }
+    /// Of some values and their sorted keys.
+    fn of(values: &[f64], sorted_keys: &[u64]) -> Self {
+        let count = values.len();
+        let mean = values.iter().sum::<f64>() / count as f64;
+        let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        Self { count: count as u64, mean, squares, min_key: sorted_keys[0], max_key: sorted_keys[count - 1] }
     }
 
     fn std(&self) -> f64 {
@@ -98,8 +79,8 @@ impl Moments {
         self.squares += other.squares + delta * delta * self.count as f64 * share;
         self.mean += delta * share;
         self.count = count;
-        self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
+        self.min_key = self.min_key.min(other.min_key);
+        self.max_key = self.max_key.max(other.max_key);
     }
 }
 
@@ -123,72 +104,89 @@ struct Gathered {
 /// Gathers the statistics of episodes.
 pub(crate) struct Statistics {
     features: Vec<Gathered>,
+    spool: Spool,
     values: Vec<f64>,
+    keys: Vec<u64>,
 }
 
 impl Statistics {
-    pub(crate) fn new(n_slots: usize) -> Self {
+    /// Begins; values are kept in a temporary file in `folder`.
+    pub(crate) fn new(folder: &Path, n_slots: usize) -> Result<Self, IoError> {
         let gathered = |feature: &'static Feature| {
             let width = feature.width(n_slots);
             let lists = std::array::from_fn(|_| Vec::new());
             Gathered { feature, width, lists, counts: Vec::new(), whole: vec![Moments::default(); width] }
         };
         let numeric = FEATURES.iter().filter(|feature| feature.is_numeric());
-        Self { features: numeric.map(gathered).collect(), values: Vec::new() }
+        let features = numeric.map(gathered).collect();
+        Ok(Self { features, spool: Spool::create(folder)?, values: Vec::new(), keys: Vec::new() })
     }
 
-    /// Adds an episode, whose values are in some rows of the numeric columns.
-    pub(crate) fn append(&mut self, numbers: &[Numbers<'_>], rows: &Range<usize>) {
-        for (gathered, numbers) in self.features.iter_mut().zip(numbers) {
-            gathered.counts.push(rows.len() as i64);
+    /// Adds an episode: the rows of the numeric columns from `first_row` on.
+    pub(crate) fn append(&mut self, columns: &[Numbers<'_>], first_row: usize, n_rows: usize) -> Result<(), IoError> {
+        self.spool.begin_block(n_rows)?;
+        let places = QUANTILES.map(|(_, share)| Place::new(share, n_rows as u64));
+        for (gathered, numbers) in self.features.iter_mut().zip(columns) {
             for dimension in 0..gathered.width {
-                numbers.copy_dimension(rows.clone(), dimension, gathered.width, &mut self.values);
-                self.values.sort_unstable_by(f64::total_cmp);
-                gathered.append(dimension, &self.values);
+                numbers.copy_dimension(first_row, (dimension, gathered.width), &mut self.values, &mut self.keys);
+                self.keys.sort_unstable();
+                gathered.append(dimension, &self.values, &self.keys, &places);
+                self.spool.append(&self.keys, key_bytes(gathered.feature.dtype))?;
             }
         }
+        Ok(())
     }
 
     /// Takes the episodes' statistics out as the columns `stats/FEATURE/NAME`.
     pub(crate) fn take(&mut self) -> Result<Vec<(String, ArrayRef)>, ArrowError> {
         let mut columns = Vec::new();
-        for gathered in &mut self.features {
+        for gathered in self.features.iter_mut().filter(|of| of.feature.has_episode_statistics()) {
             gathered.take(&mut columns)?;
         }
         Ok(columns)
     }
 
-    /// Statistics of the whole dataset, by feature: the quantiles are selected from the files of frames.
-    pub(crate) fn finish(
-        &self,
-        root: &Path,
-        files: &[String],
-    ) -> Result<Vec<(&'static str, FeatureStatistics)>, TableError> {
-        let selector = |moments: &Moments, feature: &Feature| {
-            Selector::new(feature.dtype, moments.min, moments.max, moments.count, &QUANTILES.map(|(_, share)| share))
+    /// Statistics of the whole dataset, by feature.
+    pub(crate) fn finish(self) -> Result<Vec<(&'static str, FeatureStatistics)>, IoError> {
+        let shares = QUANTILES.map(|(_, share)| share);
+        let selectors = self.features.iter().flat_map(|of| {
+            let dtype = of.feature.dtype;
+            let keys = |moments: &Moments| (moments.min_key, moments.max_key);
+            of.whole
+                .iter()
+                .map(move |whole| (Selector::new(dtype, keys(whole), whole.count, &shares), key_bytes(dtype)))
+        });
+        let mut selectors: Vec<(Selector, usize)> = selectors.collect();
+        self.spool.select(&mut selectors)?;
+        let mut rest = &selectors[..];
+        let whole = |of: &Gathered| {
+            let (selectors, others) = rest.split_at(of.width);
+            rest = others;
+            (of.feature.name, of.whole_statistics(selectors))
         };
-        let features = self.features.iter();
-        let mut selectors: Vec<(&'static str, Vec<Selector>)> = features
-            .map(|of| (of.feature.name, of.whole.iter().map(|moments| selector(moments, of.feature)).collect()))
-            .collect();
-        quantile::select(root, files, &mut selectors)?;
-        let pairs = self.features.iter().zip(&selectors);
-        Ok(pairs.map(|(of, (name, selectors))| (*name, of.whole_statistics(selectors))).collect())
+        Ok(self.features.iter().map(whole).collect())
     }
 }
 
 impl Gathered {
-    fn append(&mut self, dimension: usize, sorted: &[f64]) {
-        let moments = Moments::of(sorted);
-        self.lists[MIN].push(moments.min);
-        self.lists[MAX].push(moments.max);
+    fn append(&mut self, dimension: usize, values: &[f64], sorted_keys: &[u64], places: &[Place; 5]) {
+        let moments = Moments::of(values, sorted_keys);
+        self.whole[dimension].merge(&moments);
+        if !self.feature.has_episode_statistics() {
+            return;
+        }
+        if dimension == 0 {
+            self.counts.push(values.len() as i64);
+        }
+        let value = |key: u64| value_of(self.feature.dtype, key);
+        self.lists[MIN].push(value(moments.min_key));
+        self.lists[MAX].push(value(moments.max_key));
         self.lists[MEAN].push(moments.mean);
         self.lists[STD].push(moments.std());
-        for (list, (_, share)) in self.lists[FIRST_QUANTILE..].iter_mut().zip(QUANTILES) {
-            let place = quantile::Place::new(share, sorted.len() as u64);
-            list.push(place.interpolate(sorted[place.below as usize], sorted[place.above as usize]));
+        for (list, place) in self.lists[FIRST_QUANTILE..].iter_mut().zip(places) {
+            let nearest = [place.below, place.above].map(|rank| value(sorted_keys[rank as usize]));
+            list.push(place.interpolate(nearest[0], nearest[1]));
         }
-        self.whole[dimension].merge(&moments);
     }
 
     fn take(&mut self, columns: &mut Vec<(String, ArrayRef)>) -> Result<(), ArrowError> {
@@ -206,14 +204,14 @@ impl Gathered {
         Ok(())
     }
 
-    fn whole_statistics(&self, selectors: &[Selector]) -> FeatureStatistics {
-        let of_all = |value: fn(&Moments) -> f64| self.whole.iter().map(value).collect();
-        let quantile = |position: usize| selectors.iter().map(|selector| selector.quantile(position)).collect();
+    fn whole_statistics(&self, selectors: &[(Selector, usize)]) -> FeatureStatistics {
+        let dtype = self.feature.dtype;
+        let quantile = |position: usize| selectors.iter().map(|(selector, _)| selector.quantile(position)).collect();
         FeatureStatistics {
-            min: of_all(|moments| moments.min),
-            max: of_all(|moments| moments.max),
-            mean: of_all(|moments| moments.mean),
-            std: of_all(Moments::std),
+            min: self.whole.iter().map(|moments| value_of(dtype, moments.min_key)).collect(),
+            max: self.whole.iter().map(|moments| value_of(dtype, moments.max_key)).collect(),
+            mean: self.whole.iter().map(|moments| moments.mean).collect(),
+            std: self.whole.iter().map(Moments::std).collect(),
             count: vec![self.whole[0].count as i64],
             q01: quantile(0),
             q10: quantile(1),

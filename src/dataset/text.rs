@@ -1,6 +1,6 @@
 //! Texts that occur again and again, each kept once.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, DictionaryArray, Int32Array, StringArray};
@@ -11,7 +11,7 @@ use arrow::error::ArrowError;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TextTable {
     texts: Vec<String>,
-    keys: HashMap<String, i32>,
+    keys: BTreeMap<String, i32>,
 }
 
 impl TextTable {

@@ -24,11 +24,11 @@ use crate::task::Family;
 use crate::trace::Episode;
 
 /// Rows of frames and of calls that make a row group, at least. A row group holds whole episodes.
-const GROUP_ROWS: usize = 4096;
+const GROUP_ROWS: usize = 1 << 13;
 /// The same for scoping labels, which are many and small.
-const SCOPE_GROUP_ROWS: usize = 1 << 16;
+const SCOPE_GROUP_ROWS: usize = 1 << 17;
 /// The same for episodes.
-const EPISODE_GROUP_ROWS: usize = 1024;
+const EPISODE_GROUP_ROWS: usize = 1 << 12;
 const MEGABYTE: usize = 1 << 20;
 
 /// What was written.
@@ -149,11 +149,11 @@ impl Tables {
             scopes: ScopeRows::default(),
             provenance: ProvenanceRows::default(),
             meta: MetaRows::default(),
-            statistics: Statistics::new(n_slots),
+            statistics: Statistics::new(root, n_slots)?,
             data_files: rolling(layout::DATA, FRAMES, FrameRows::options(n_slots)),
             call_files: rolling(layout::CALLS, CALLS, CallRows::options()),
             scope_files: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),
-            meta_files: rolling(layout::META_EPISODES, META_EPISODES, WriteOptions::default()),
+            meta_files: rolling(layout::META_EPISODES, META_EPISODES, MetaRows::options()),
             provenance_file: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, WriteOptions::default())?,
             n_episodes: 0,
             n_frames: 0,
@@ -179,7 +179,7 @@ impl Tables {
         let (episode_index, first_index) = (places.episode_index, places.first_index);
         let first_row = self.frames.n_rows();
         self.frames.append(view, EpisodeIds { episode_index, first_index, task_index, fps });
-        self.statistics.append(&self.frames.numbers(), &(first_row..self.frames.n_rows()));
+        self.statistics.append(&self.frames.numbers(), first_row, view.n_rows())?;
         self.calls.append(view, episode_index);
         self.provenance.append(view, source, places);
         self.meta.append(view, places);
@@ -207,18 +207,33 @@ impl Tables {
 
     fn write_full_groups(&mut self) -> Result<(), ConvertError> {
         if self.frames.n_rows() >= GROUP_ROWS {
-            self.data_files.write_row_group(&self.frames.take()?)?;
+            self.write_frames()?;
         }
         if self.calls.n_rows() >= GROUP_ROWS {
-            self.call_files.write_row_group(&self.calls.take()?)?;
+            self.write_calls()?;
         }
         if self.scopes.n_rows() >= SCOPE_GROUP_ROWS {
-            self.scope_files.write_row_group(&self.scopes.take()?)?;
+            self.write_scopes()?;
         }
         if self.meta.n_rows() >= EPISODE_GROUP_ROWS {
             self.write_episodes()?;
         }
         Ok(())
+    }
+
+    #[inline(never)]
+    fn write_frames(&mut self) -> Result<(), ConvertError> {
+        Ok(self.data_files.write_row_group(&self.frames.take()?)?)
+    }
+
+    #[inline(never)]
+    fn write_calls(&mut self) -> Result<(), ConvertError> {
+        Ok(self.call_files.write_row_group(&self.calls.take()?)?)
+    }
+
+    #[inline(never)]
+    fn write_scopes(&mut self) -> Result<(), ConvertError> {
+        Ok(self.scope_files.write_row_group(&self.scopes.take()?)?)
     }
 
     fn write_episodes(&mut self) -> Result<(), ConvertError> {
@@ -249,7 +264,7 @@ impl Tables {
         let Self { n_episodes, n_frames, n_calls, n_scopes, n_failed, statistics, .. } = self;
         let data_files = self.data_files.finish()?;
         self.provenance_file.commit()?;
-        let stats = statistics.finish(root, &data_files)?;
+        let stats = statistics.finish()?;
         write_json(&root.join(layout::STATS), &Stats(stats))?;
         let single = [layout::INFO, layout::STATS, layout::TASKS, layout::SUBTASKS, layout::NTP_INFO, layout::EPISODES];
         let mut files: Vec<String> = single.map(ToOwned::to_owned).into();
@@ -272,13 +287,13 @@ impl Tables {
 
     fn write_rest(&mut self) -> Result<(), ConvertError> {
         if self.frames.n_rows() > 0 {
-            self.data_files.write_row_group(&self.frames.take()?)?;
+            self.write_frames()?;
         }
         if self.calls.n_rows() > 0 {
-            self.call_files.write_row_group(&self.calls.take()?)?;
+            self.write_calls()?;
         }
         if self.scopes.n_rows() > 0 {
-            self.scope_files.write_row_group(&self.scopes.take()?)?;
+            self.write_scopes()?;
         }
         if self.provenance.n_rows() > 0 {
             self.write_episodes()?;

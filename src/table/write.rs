@@ -13,7 +13,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, Encoding};
 use parquet::file::metadata::{KeyValue, SortingColumn};
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 
 use crate::artifact::AtomicFile;
@@ -40,9 +40,12 @@ pub fn write(path: &Path, schema: &TableSchema, columns: Vec<(&str, Column)>) ->
 pub(crate) struct WriteOptions {
     /// Lists that have a fixed length, by column.
     pub(crate) list_lengths: BTreeMap<&'static str, i32>,
-    /// Columns of growing whole numbers, whose differences are stored.
+    /// Columns of numbers that hardly ever occur twice.
+    pub(crate) plain: Vec<&'static str>,
+    /// Columns of whole numbers near to their neighbours, whose differences are stored.
     pub(crate) delta_encoded: Vec<&'static str>,
-    /// Columns that the rows are sorted by.
+    /// Columns that the rows are sorted by. Where there are any, only these have minima and maxima in the file: they
+    /// let a reader skip pages, the others' would not.
     pub(crate) sorted_by: Vec<&'static str>,
     /// Further entries of the file's key-value metadata.
     pub(crate) metadata: Vec<(String, String)>,
@@ -58,7 +61,9 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub(crate) fn create(path: &Path, schema: &TableSchema, options: WriteOptions) -> Result<Self, TableError> {
-        let parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        let mut parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        // Where there is an Arrow schema in a file, pyarrow and pandas read metadata from it alone.
+        parsed.arrow = parsed.arrow.with_metadata(options.metadata.iter().cloned().collect());
         let properties = properties(&parsed, options);
         let file = AtomicFile::create(path)?;
         let options =
@@ -171,10 +176,19 @@ fn properties(parsed: &ParsedSchema, options: WriteOptions) -> WriterProperties 
     };
     let mut builder =
         WriterProperties::builder().set_created_by(CREATED_BY.to_owned()).set_compression(Compression::SNAPPY);
+    if !options.sorted_by.is_empty() {
+        builder = builder.set_statistics_enabled(EnabledStatistics::None);
+        for name in &options.sorted_by {
+            builder = builder.set_column_statistics_enabled(ColumnPath::from(*name), EnabledStatistics::Page);
+        }
+    }
     for name in parsed.float_lists() {
         if let Some(column) = path_of(name) {
             builder = builder.set_column_dictionary_enabled(column.path().clone(), false);
         }
+    }
+    for name in options.plain {
+        builder = builder.set_column_dictionary_enabled(ColumnPath::from(name), false);
     }
     for name in options.delta_encoded {
         let column = ColumnPath::from(name);

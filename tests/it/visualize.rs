@@ -1,7 +1,5 @@
 //! Episodes as Rerun recordings, read back from the file.
 
-#![expect(clippy::unwrap_used, reason = "a test ends where something is not as it should be")]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
