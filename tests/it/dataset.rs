@@ -248,18 +248,18 @@ fn scoping_labels_are_those_of_the_spans() {
     let episode = columns.int64("episode_index").unwrap();
     let call = columns.int64("call_id").unwrap();
     let frame = columns.int64("specification_frame").unwrap();
-    let label = columns.text("label").unwrap();
+    let label = columns.int64("label").unwrap();
     let (is_start, is_end) = (columns.boolean("is_start").unwrap(), columns.boolean("is_end").unwrap());
     let mut row = 0;
     for (episode_index, value) in episodes.iter().enumerate() {
         for of in value.calls.iter().filter(|call| call.program != Program::None) {
             let output = of.output.unwrap();
             for at in of.input.begin..of.input.end {
-                let found = (episode[row], call[row], frame[row], label[row].as_str(), is_start[row], is_end[row]);
-                let expected: ScopingLabel = output.label(at);
+                let found = (episode[row], call[row], frame[row], label[row], is_start[row], is_end[row]);
+                let expected = ScopingLabel::ALL.iter().position(|&label| label == output.label(at)).unwrap() as i64;
                 let (is_first, is_last) = (at == output.begin, at == output.last());
                 let ids = (episode_index as i64, i64::from(of.id.0), i64::from(at));
-                assert_eq!(found, (ids.0, ids.1, ids.2, expected.name(), is_first, is_last));
+                assert_eq!(found, (ids.0, ids.1, ids.2, expected, is_first, is_last));
                 row += 1;
             }
         }
