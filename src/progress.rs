@@ -2,7 +2,7 @@
 //!
 //! The only reader of a clock in the library; nothing of it reaches a file.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::{IsTerminal as _, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 /// How far one unit of work has come. May be told of from several threads.
-#[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
     name: String,
@@ -21,29 +20,43 @@ pub struct Progress {
 }
 
 /// The state of plain lines.
-#[derive(Debug)]
 struct Plain {
     began: Instant,
     said: Instant,
+    every: Duration,
+    out: Box<dyn Write + Send>,
+}
+
+impl Plain {
+    /// One line. Nothing is left to do when the stream is closed.
+    fn say(&mut self, line: &str) {
+        let _closed = writeln!(self.out, "{}", line.trim_end());
+    }
 }
 
 impl Progress {
     /// Progress of the work `name` over `total` of `what` (`episodes`, `steps`), shown on stderr.
     pub fn new(name: &str, total: u64, what: &str) -> Self {
-        let on_terminal = std::io::stderr().is_terminal();
-        let target = if on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(total), target);
+        if !std::io::stderr().is_terminal() {
+            return Self::plain(name, total, what, LINE_EVERY, Box::new(std::io::stderr()));
+        }
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template(&format!(
             "{{prefix:<28}} {{bar:32}} {{pos}}/{{len}} {what}  {{elapsed}} (left {{eta}})  {{msg}}"
         )) {
             bar.set_style(style.progress_chars("━╸─"));
         }
         bar.set_prefix(name.to_owned());
-        let plain = (!on_terminal).then(|| {
-            let now = now();
-            Mutex::new(Plain { began: now, said: now })
-        });
-        Self { bar, name: name.to_owned(), what: what.to_owned(), plain }
+        Self { bar, name: name.to_owned(), what: what.to_owned(), plain: None }
+    }
+
+    /// Progress told in lines: one at once, then at most one in `every`, one at the end.
+    fn plain(name: &str, total: u64, what: &str, every: Duration, out: Box<dyn Write + Send>) -> Self {
+        let began = now();
+        let mut plain = Plain { began, said: began, every, out };
+        plain.say(&format!("{name}: {total} {what}"));
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+        Self { bar, name: name.to_owned(), what: what.to_owned(), plain: Some(Mutex::new(plain)) }
     }
 
     /// Progress that is not shown.
@@ -64,23 +77,24 @@ impl Progress {
 
     /// The work is done, with its result.
     pub fn finish(&self, result: &str) {
+        let shown = !self.bar.is_hidden();
         self.bar.finish_and_clear();
-        if self.plain.is_some() || !self.bar.is_hidden() {
-            say(&format!("{}: {result} in {}", self.name, duration(self.elapsed())));
-        }
-    }
-
-    fn elapsed(&self) -> Duration {
+        let line = |elapsed| format!("{}: {result} in {}", self.name, duration(elapsed));
         match &self.plain {
-            Some(plain) => plain.lock().map_or(Duration::ZERO, |plain| plain.began.elapsed()),
-            None => self.bar.elapsed(),
+            Some(plain) => {
+                let Ok(mut plain) = plain.lock() else { return };
+                let line = line(plain.began.elapsed());
+                plain.say(&line);
+            }
+            None if shown => say(&line(self.bar.elapsed())),
+            None => {}
         }
     }
 
     fn line_if_due(&self) {
         let Some(plain) = &self.plain else { return };
         let Ok(mut plain) = plain.lock() else { return };
-        if plain.said.elapsed() < LINE_EVERY {
+        if plain.said.elapsed() < plain.every {
             return;
         }
         plain.said = now();
@@ -88,7 +102,7 @@ impl Progress {
         let left = plain.began.elapsed().as_secs_f64() * (total.saturating_sub(done)) as f64 / done.max(1) as f64;
         let left = duration(Duration::from_secs_f64(left.min(1e6)));
         let message = self.bar.message();
-        say(&format!("{}: {done}/{total} {}, {left} left  {message}", self.name, self.what));
+        plain.say(&format!("{}: {done}/{total} {}, {left} left  {message}", self.name, self.what));
     }
 }
 
@@ -113,9 +127,76 @@ fn duration(duration: Duration) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::sync::{Arc, Mutex};
     use std::time::Duration;
 
-    use super::duration;
+    use super::{Progress, duration};
+
+    /// What was written, shared with the writer.
+    #[derive(Clone, Default)]
+    struct Said(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Said {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Said {
+        fn lines(&self) -> Vec<String> {
+            String::from_utf8(self.0.lock().unwrap().clone()).unwrap().lines().map(str::to_owned).collect()
+        }
+    }
+
+    fn plain(every: Duration) -> (Progress, Said) {
+        let said = Said::default();
+        (Progress::plain("generate", 4, "episodes", every, Box::new(said.clone())), said)
+    }
+
+    #[test]
+    fn without_a_terminal_there_is_a_line_at_the_start_and_one_at_the_end() {
+        let (progress, said) = plain(Duration::MAX);
+        (0..4).for_each(|_| progress.inc(1));
+        progress.finish("4 episodes");
+        let lines = said.lines();
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        assert_eq!(lines[0], "generate: 4 episodes");
+        assert!(lines[1].starts_with("generate: 4 episodes in 0."), "{lines:?}");
+    }
+
+    #[test]
+    fn a_line_that_is_due_tells_how_far_and_how_long_and_the_message() {
+        let (progress, said) = plain(Duration::ZERO);
+        progress.message("loss 0.5");
+        progress.inc(4);
+        assert_eq!(said.lines()[1], "generate: 4/4 episodes, 0.0 s left  loss 0.5");
+    }
+
+    #[test]
+    fn lines_of_several_threads_are_whole_and_none_is_lost() {
+        let (progress, said) = plain(Duration::ZERO);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| progress.inc(1));
+            }
+        });
+        let lines = said.lines();
+        assert_eq!(lines.len(), 5, "{lines:?}");
+        assert!(lines[1..].iter().all(|line| line.starts_with("generate: ") && line.contains("/4 episodes, ")));
+    }
+
+    #[test]
+    fn nothing_comes_of_hidden_progress() {
+        let progress = Progress::hidden();
+        progress.inc(1);
+        progress.finish("done");
+        assert!(progress.plain.is_none() && progress.bar.is_hidden());
+    }
 
     #[test]
     fn durations_are_told_in_the_unit_that_fits() {

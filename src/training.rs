@@ -23,7 +23,7 @@ mod learner;
 mod metrics;
 
 pub use batch::{Part, draw};
-pub use config::{Curriculum, LossWeights, Pairing, TrainConfig};
+pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};
 pub use examples::{Example, Examples};
 pub use learner::{Learner, Losses, losses};
 pub use metrics::Metric;
@@ -51,7 +51,7 @@ pub const METRICS_FILE: &str = "metrics.parquet";
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
     /// A setting makes no sense.
-    #[error("train.{key} is {found}; allowed: {allowed}")]
+    #[error("{key} is {found}; allowed: {allowed}")]
     Config {
         /// Its key.
         key: &'static str,
@@ -153,21 +153,21 @@ pub struct Hooks<'h> {
 ///
 /// [`TrainError`]; the folder then holds no `config.json`, at most a checkpoint.
 pub fn train(
-    config: &TrainConfig,
+    training: &Training,
     data: &DatasetTrials,
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
-    config.check()?;
-    let config = config.resolved();
+    training.config.check()?;
+    let training = training.resolved();
     let examples = Examples::new(data)?;
     let family = family(data)?;
-    let training =
-        serde_json::to_value(&config).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let model = ModelConfig::new(config.variant, family, data.n_slots, training);
+    let written =
+        serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
+    let model = ModelConfig::new(training.variant, family, data.n_slots, written);
     let device = Device::flex().autodiff();
-    let seed = Seed(config.seed).derive("train", &[]);
-    let run = Run { config: &config, examples: &examples, model: &model, folder, seed };
+    let seed = Seed(training.seed).derive("train", &[]);
+    let run = Run { config: &training.config, examples: &examples, model: &model, folder, seed };
     match model.network {
         NetworkConfig::ObjectCentric(widths) => run.train(ObjectCentric::new(&widths, seed, &device), hooks),
         NetworkConfig::Flattened(widths) => run.train(Flattened::new(&widths, data.n_slots, seed, &device), hooks),

@@ -67,7 +67,7 @@ fn check_episodes(root: &Path, texts: &Texts, validation: &mut Validation) -> Re
         tables.check_scopes(&row, calls_are_there.then_some(&calls), validation);
     }
     tables.finish(validation);
-    meta::check_unlisted(root, episode_check.data_places(), validation);
+    meta::check_files(root, episode_check.data_places(), validation);
     frame_check.compare_ranges(root, texts, validation);
     Ok(())
 }

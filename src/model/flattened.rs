@@ -52,7 +52,7 @@ pub struct Flattened {
     argument_slots: Linear,
 }
 
-/// f_TSE: frames embedded, convolved over time, and summed up in one vector.
+/// `f_TSE`: frames embedded, convolved over time, and summed up in one vector.
 #[derive(Module, Debug)]
 struct SpecificationEncoder {
     frame: Mlp,

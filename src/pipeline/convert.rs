@@ -32,7 +32,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
             episodes: episodes.map(|episode| {
                 progress.inc(1);
                 context.go_on().map_err(Box::new)?;
-                Ok(episode.map_err(PipelineError::from).map_err(Box::new)?)
+                episode.map_err(PipelineError::from).map_err(Box::new)
             }),
         })
     };

@@ -6,7 +6,6 @@ use crate::artifact;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::task::{Family, MAX_INSTANCES, Split};
-use crate::training::TrainConfig;
 
 /// A checked pipeline.
 #[derive(Clone, Debug)]
@@ -154,12 +153,6 @@ impl Pipeline {
                     return Err(self.value(&format!("models[{idx}]"), format!("{name} is there twice")));
                 }
                 names.push(name);
-            }
-            let TrainConfig { name, variant, seed, .. } = &model.training;
-            let unset = TrainConfig::default();
-            if (name, variant, seed) != (&unset.name, &unset.variant, &unset.seed) {
-                let problem = "name, variant and seed are not set here: variant and seeds belong to [[models]] itself";
-                return Err(self.value(&format!("models[{idx}].training"), problem));
             }
             if let Err(problem) = model.training.check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));

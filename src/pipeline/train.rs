@@ -11,7 +11,7 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{ModelSpec, PipelineError, Stage, tasks};
 use crate::task::Split;
-use crate::training::{self, Hooks, METRICS_FILE, TrainConfig};
+use crate::training::{self, Hooks, METRICS_FILE, Training};
 
 /// What a finished training leaves; checkpoints are not part of it.
 const RESULT_FILES: [&str; 3] = [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE];
@@ -47,7 +47,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let trials = training_trials(context, spec)?;
     unit.dir.begin(&unit.plan)?;
     let progress = context.progress(unit, u64::from(spec.training.steps), "steps");
-    let config = TrainConfig { variant: spec.variant, seed, ..spec.training.clone() };
+    let training = Training { variant: spec.variant, seed, config: spec.training.clone() };
     let mut shown = 0;
     let mut on_progress = |now: training::Progress| {
         progress.inc(u64::from(now.step - shown));
@@ -55,7 +55,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         progress.message(&format!("loss {:.3}", now.loss));
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
-    let summary = training::train(&config, &trials, unit.dir.path(), &mut hooks);
+    let summary = training::train(&training, &trials, unit.dir.path(), &mut hooks);
     context.go_on()?;
     let summary = summary?;
     let files: Result<Vec<FileEntry>, IoError> =

@@ -10,14 +10,7 @@ use crate::program::Program;
 /// Version of topics and messages. Raised when a reader of the version before could misread.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
-#[expect(
-    clippy::all,
-    clippy::doc_markdown,
-    clippy::allow_attributes,
-    clippy::allow_attributes_without_reason,
-    unreachable_pub,
-    reason = "generated"
-)]
+#[expect(clippy::all, clippy::doc_markdown, unreachable_pub, reason = "generated")]
 mod generated {
     include!(concat!(env!("OUT_DIR"), "/schemas.rs"));
 }

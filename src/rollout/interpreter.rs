@@ -136,10 +136,10 @@ impl<'t> Running<'t> {
         let scope = (program != Program::None).then_some(scope);
         let new = NewCall { program, argument, scope, end_of_program, prediction };
         self.calls.call(new, self.frame());
-        if let Some(action) = Action::new(program, argument) {
-            if let Err(cause) = self.world.act(action) {
-                self.first_cause.get_or_insert(cause);
-            }
+        if let Some(action) = Action::new(program, argument)
+            && let Err(cause) = self.world.act(action)
+        {
+            self.first_cause.get_or_insert(cause);
         }
         if !program.is_composite() {
             self.calls.returned(self.frame());

@@ -5,7 +5,7 @@ use rapier3d::math::{Pose as EnginePose, Vector};
 use crate::robot::{Action, GRASP_M, HOVER_M};
 use crate::scene::{BodyIndex, Mobility, Shape, SlotIndex};
 use crate::sim::Simulation;
-use crate::sim::gripper::{Gripper, MAX_OPENING_M, TIP_M};
+use crate::sim::gripper::{Gripper, MAX_OPENING_M, PALM_M, TIP_M};
 use crate::sim::motion::{Motion, Tool};
 use crate::sim::sweep::AtStart;
 use crate::sim::{drop_spot, grasp};
@@ -25,6 +25,7 @@ const LIFT_OFF_M: f32 = 0.008;
 const TOUCH_M: f32 = 0.000_3;
 /// Speed of each closing finger, in metres per second.
 const CLOSE_M_PER_S: f32 = 0.25;
+const SPARE_TICKS: u32 = 4;
 
 /// What is known of the way ahead.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -74,8 +75,10 @@ impl Simulation {
 
     fn grip(&mut self) -> Result<(), Cause> {
         self.open();
-        let found = self.world.below(self.gripper.tool.position, None);
-        let found_z = self.gripper.tool.position.z - found.map_or(0.0, |hit| hit.distance_m);
+        // From the palm: a body that was just released reaches above the gripper's reference point.
+        let palm = self.gripper.tool.at_height(self.gripper.tool.position.z + PALM_M).position;
+        let found = self.world.below(palm, None);
+        let found_z = palm.z - found.map_or(0.0, |hit| hit.distance_m);
         let aim = found.and_then(|hit| hit.body).filter(|&body| self.scene.body(body).mobility == Mobility::Movable);
         let Some(body) = aim else {
             self.sink(found_z + TIP_M, MARGIN_M);
@@ -141,26 +144,29 @@ impl Simulation {
         self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, |_| Air::Unknown);
     }
 
+    /// Closes until the fingers meet each other or something that is not to be grasped.
     fn close_on_air(&mut self) {
-        self.follow(Tool { opening_m: 0.0, ..self.gripper.tool }, |_| Air::Unknown);
+        let opening_m = self.gripper.tool.opening_m - 2.0 * self.gripper.free_closing_m(&self.world);
+        self.follow(Tool { opening_m, ..self.gripper.tool }, |_| Air::Unknown);
     }
 
-    /// Closes until both fingers touch the body; whether they do.
+    /// Closes until both fingers touch the body, which the first to touch pushes to the other; whether they do in
+    /// little more than the time that it takes: something else may be between them.
     fn close_on(&mut self, body: BodyIndex) -> bool {
         let most_m = CLOSE_M_PER_S / self.config.step_hz as f32;
-        loop {
-            let gaps = self.gripper.finger_gaps_m(&self.world, body);
-            let farther_m = gaps[0].max(gaps[1]);
+        let [left_m, right_m] = self.gripper.finger_gaps_m(&self.world, body);
+        let n_ticks = (left_m.max(right_m) / most_m).ceil() as u32 + SPARE_TICKS;
+        for _ in 0..n_ticks {
+            let [left_m, right_m] = self.gripper.finger_gaps_m(&self.world, body);
+            let farther_m = left_m.max(right_m);
             if farther_m <= TOUCH_M {
                 return true;
             }
             let tool = self.gripper.tool;
-            let opening_m = tool.opening_m - 2.0 * farther_m.min(most_m);
-            if opening_m <= 0.0 {
-                return false;
-            }
+            let opening_m = (tool.opening_m - 2.0 * farther_m.min(most_m)).max(0.0);
             self.tick(Tool { opening_m, ..tool }, Air::Unknown);
         }
+        false
     }
 
     /// Straight up to a height; not at all when it is higher already.

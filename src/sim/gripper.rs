@@ -9,9 +9,11 @@
 //! motion of the gripper and of what is fixed to it. That motion is computed directly and the engine is not stepped;
 //! the engine's gripper catches up before the next step. The simulated time is the same either way.
 
-use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle, RigidBody, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d::geometry::{ColliderBuilder, Group, SharedShape};
 use rapier3d::math::{Pose as EnginePose, Vector};
+use rapier3d::parry::query::distance;
+use rapier3d::parry::shape::Cuboid;
 
 use crate::scene::BodyIndex;
 use crate::sim::motion::Tool;
@@ -23,7 +25,7 @@ pub(super) const MAX_OPENING_M: f32 = 0.07;
 /// From the gripper's reference point down to the finger tips, in metres.
 pub(super) const TIP_M: f32 = 0.028;
 /// From the gripper's reference point up to the palm's lower side, in metres.
-const PALM_M: f32 = 0.015;
+pub(super) const PALM_M: f32 = 0.015;
 /// Half of a finger's extents, in metres: narrow enough for neighbours 7 cm apart.
 const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, (TIP_M + PALM_M) / 2.0];
 const PALM_HALF_M: [f32; 3] = [0.013, 0.044, 0.008];
@@ -34,6 +36,10 @@ pub(super) const OPEN_REACH_M: f32 = MAX_OPENING_M / 2.0 + 2.0 * FINGER_HALF_M[1
 pub(super) const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
 /// How far a held body may shift before it counts as lost, in metres.
 const SLIP_M: f32 = 0.005;
+/// The most that the fingers hold, in newtons. A block weighs 0.6.
+const GRIP_N: f32 = 10.0;
+/// For how long: what the fingers pressed into the table resists for a few steps.
+const OVERLOAD_SECS: f32 = 0.03;
 
 /// A body in the grasp.
 #[derive(Clone, Copy)]
@@ -42,6 +48,8 @@ pub(super) struct Held {
     pub(super) handle: RigidBodyHandle,
     pub(super) in_gripper: EnginePose,
     joint: ImpulseJointHandle,
+    /// How long it has pulled harder than the fingers hold.
+    overloaded_secs: f32,
 }
 
 /// Whether the engine's gripper is where the tool is.
@@ -107,8 +115,7 @@ impl Gripper {
         if let Some(held) = self.held {
             let body = &mut bodies[held.handle];
             body.set_position(self.tool.in_world() * held.in_gripper, true);
-            body.set_linvel(Vector::ZERO, true);
-            body.set_angvel(Vector::ZERO, true);
+            stop(body);
         }
     }
 
@@ -145,8 +152,10 @@ impl Gripper {
         let joint = world.engine.insert_impulse_joint(self.palm, handle, joint);
         let collider = world.collider(body);
         world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, SCENE_GROUP));
+        // What the fingers' push left it with must not be set free when it is let go.
+        stop(&mut world.engine.bodies[handle]);
         let in_gripper = self.tool.in_world().inv_mul(&world.in_world(body));
-        self.held = Some(Held { body, handle, in_gripper, joint });
+        self.held = Some(Held { body, handle, in_gripper, joint, overloaded_secs: 0.0 });
     }
 
     /// Lets go. The body does not touch the gripper until [`Gripper::part_from`].
@@ -164,24 +173,41 @@ impl Gripper {
         world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, Group::ALL));
     }
 
-    /// Whether what was held has shifted in the grasp.
-    pub(super) fn has_slipped(&self, world: &World) -> bool {
-        self.held.is_some_and(|held| {
-            let now = self.tool.in_world().inv_mul(&world.in_world(held.body));
-            (now.translation - held.in_gripper.translation).length() > SLIP_M
-        })
+    /// After a step of the engine: whether what is held was torn out of the grasp, because it has shifted or because
+    /// it has pulled harder than the fingers hold.
+    pub(super) fn has_slipped(&mut self, world: &World) -> bool {
+        let tool_in_world = self.tool.in_world();
+        let Some(held) = &mut self.held else {
+            return false;
+        };
+        let now = tool_in_world.inv_mul(&world.in_world(held.body));
+        let is_overloaded = world.joint_force_n(held.joint) > GRIP_N;
+        held.overloaded_secs = if is_overloaded { held.overloaded_secs + world.step_secs() } else { 0.0 };
+        let shift_m = (now.translation - held.in_gripper.translation).length();
+        shift_m > SLIP_M || held.overloaded_secs > OVERLOAD_SECS
     }
 
     /// Distance from each finger to a body, in metres; 0 when they touch.
     pub(super) fn finger_gaps_m(&self, world: &World, body: BodyIndex) -> [f32; 2] {
         let [x, y, z] = FINGER_HALF_M;
-        let finger = rapier3d::parry::shape::Cuboid::new(Vector::new(x, y, z));
+        let finger = Cuboid::new(Vector::new(x, y, z));
         let target = &world.engine.colliders[world.collider(body)];
         SIDES.map(|side| {
             let pose = finger_in_world(&self.tool, side);
-            let found = rapier3d::parry::query::distance(&pose, &finger, target.position(), target.shape());
+            let found = distance(&pose, &finger, target.position(), target.shape());
             found.map_or(f32::MAX, |found| found.distance)
         })
+    }
+
+    /// How far each finger can close before one of them meets something, in metres.
+    pub(super) fn free_closing_m(&self, world: &World) -> f32 {
+        let [x, y, z] = FINGER_HALF_M;
+        let finger = Cuboid::new(Vector::new(x, y, z));
+        let free_m = |side: f32| {
+            let way = self.tool.in_world().transform_vector(Vector::new(0.0, -side * self.tool.opening_m / 2.0, 0.0));
+            world.cast(&finger, &finger_in_world(&self.tool, side), way, AtStart::Stops, None)
+        };
+        SIDES.into_iter().filter_map(free_m).fold(self.tool.opening_m / 2.0, f32::min)
     }
 
     /// How far the gripper, with what it holds, can move along `path` before it meets something; its whole length
@@ -191,6 +217,11 @@ impl Gripper {
         let parts = hull(tool).into_iter().chain(self.carried(world, tool));
         parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
     }
+}
+
+fn stop(body: &mut RigidBody) {
+    body.set_linvel(Vector::ZERO, true);
+    body.set_angvel(Vector::ZERO, true);
 }
 
 fn palm_in_world(tool: &Tool) -> EnginePose {

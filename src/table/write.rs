@@ -62,7 +62,9 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub(crate) fn create(path: &Path, schema: &TableSchema, options: WriteOptions) -> Result<Self, TableError> {
-        let parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        let mut parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        // Where there is an Arrow schema in a file, pyarrow and pandas read metadata from it alone.
+        parsed.arrow = parsed.arrow.with_metadata(options.metadata.iter().cloned().collect());
         let properties = Arc::new(properties(&parsed, options));
         let file = AtomicFile::create(path)?;
         let writer = SerializedFileWriter::new(file, parsed.descriptor.root_schema_ptr(), properties)

@@ -115,6 +115,8 @@ pub enum CallProblem {
     Misnumbered { found: u32 },
     #[error("the first call must be a composite root without caller, and no other call may be without")]
     Root,
+    #[error("its span {found:?} holds no frame")]
+    EmptySpan { found: Span },
     #[error("its caller {caller} does not come before it")]
     CallerAfter { caller: u32 },
     #[error("its caller runs {caller}, which calls nothing")]
@@ -266,11 +268,12 @@ pub fn check_calls(
     }
     let mut progress = vec![CallProgress::default(); calls.len()];
     for (position, call) in calls.iter().enumerate() {
-        let found = match call.caller {
+        let in_tree = |()| match call.caller {
             None => check_root(position, call, n_frames, specification_frames),
             Some(caller) => check_callee(position, call, caller, calls, &mut progress),
         };
-        found
+        check_spans(call)
+            .and_then(in_tree)
             .and_then(|()| check_alone(n_slots, position, call))
             .map_err(|problem| TraceError::Call { call: position as u32, problem })?;
     }
@@ -289,6 +292,14 @@ struct CallProgress {
     n_callees: u16,
     ended: bool,
     last_return: u32,
+}
+
+fn check_spans(call: &ProgramCall) -> Result<(), CallProblem> {
+    let spans = [Some(call.input), call.output, Some(call.frames)];
+    match spans.into_iter().flatten().find(|span| span.is_empty()) {
+        Some(found) => Err(CallProblem::EmptySpan { found }),
+        None => Ok(()),
+    }
 }
 
 fn check_root(

@@ -96,9 +96,9 @@ mod tests {
 
     #[test]
     fn labels_of_a_span_are_start_inside_end_and_outside_elsewhere() {
+        use ScopingLabel::{End, Inside, Outside, Start};
         let span = Span { begin: 1, end: 4 };
         let labels: Vec<_> = (0..5).map(|frame| span.label(frame)).collect();
-        use ScopingLabel::{End, Inside, Outside, Start};
         assert_eq!(labels, [Outside, Start, Inside, End, Outside]);
     }
 

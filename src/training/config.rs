@@ -6,18 +6,42 @@ use serde::{Deserialize, Serialize};
 use crate::model::Variant;
 use crate::training::TrainError;
 
-/// How a model is trained: one `[[train]]` table of a pipeline file.
+/// What is trained, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// The kind of network.
+    pub variant: Variant,
+    /// What parameters, batches and augmentations are drawn from.
+    pub seed: u64,
+    /// How.
+    pub config: TrainConfig,
+}
+
+impl Training {
+    /// With every default that depends on the variant filled in.
+    #[must_use]
+    pub fn resolved(&self) -> Self {
+        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
+            Variant::Ntp => (0.003, 0.0, 0.2),
+            Variant::NtpPaper => (0.002, 1.0, 0.0),
+        };
+        let config = TrainConfig {
+            learning_rate: self.config.learning_rate.or(Some(learning_rate)),
+            relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
+            gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
+            ..self.config.clone()
+        };
+        Self { config, ..self.clone() }
+    }
+}
+
+/// How a model is trained, as it stands in a pipeline file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
-    /// Name of the model's folder; by default the variant's name.
-    pub name: Option<String>,
-    /// The kind of network.
-    pub variant: Variant,
     /// Steps of the optimizer.
     pub steps: u32,
-    /// What parameters, batches and augmentations are drawn from.
-    pub seed: u64,
     /// Decisions of the root program in a step; programs below it have half as many each.
     pub batch: u32,
     /// Highest learning rate; by default 0.003 for object-centric and 0.002 for flattened networks.
@@ -50,10 +74,7 @@ pub struct TrainConfig {
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
-            name: None,
-            variant: Variant::default(),
             steps: 1000,
-            seed: 0,
             batch: 32,
             learning_rate: None,
             warmup_steps: 100,
@@ -113,34 +134,13 @@ impl Default for LossWeights {
 }
 
 impl TrainConfig {
-    /// The name of the model's folder.
-    pub fn name(&self) -> &str {
-        self.name.as_deref().unwrap_or_else(|| self.variant.name())
-    }
-
-    /// With every default that depends on the variant filled in.
-    #[must_use]
-    pub fn resolved(&self) -> Self {
-        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
-            Variant::Ntp => (0.003, 0.0, 0.2),
-            Variant::NtpPaper => (0.002, 1.0, 0.0),
-        };
-        Self {
-            name: Some(self.name().to_owned()),
-            learning_rate: self.learning_rate.or(Some(learning_rate)),
-            relabel_slots: self.relabel_slots.or(Some(relabel_slots)),
-            gripper_jitter: self.gripper_jitter.or(Some(gripper_jitter)),
-            ..self.clone()
-        }
-    }
-
     /// Whether the settings make sense.
     ///
     /// # Errors
     ///
     /// [`TrainError::Config`] for the first that does not, with what is allowed.
     pub fn check(&self) -> Result<(), TrainError> {
-        let Self { name: _, variant: _, seed: _, pairing: _, curriculum: _, loss, .. } = self;
+        let Self { pairing: _, curriculum: _, warmup_steps: _, loss, .. } = self;
         let at_least_one = [
             ("steps", self.steps),
             ("batch", self.batch),
@@ -175,9 +175,9 @@ impl TrainConfig {
         }
     }
 
-    /// The learning rate of a step: a straight rise, then a cosine.
+    /// The learning rate of a step: a straight rise, then a cosine. Zero where none is set or filled in.
     pub fn learning_rate_at(&self, step: u32) -> f64 {
-        let highest = f64::from(self.resolved().learning_rate.unwrap_or_default());
+        let highest = f64::from(self.learning_rate.unwrap_or_default());
         if step < self.warmup_steps {
             return highest * f64::from(step + 1) / f64::from(self.warmup_steps);
         }

@@ -3,19 +3,18 @@
 use rerun::Boxes3D;
 use rerun::components::FillMode;
 
-use crate::robot::GRASP_M;
 use crate::trace::{Episode, Frame};
 use crate::visualize::store::Store;
 use crate::visualize::world::put_poses;
 use crate::visualize::{VisualizeError, clock, palette};
 
-/// Half of a finger's width, thickness and length, in metres.
-const FINGER_HALF_M: [f32; 3] = [0.009, 0.004, 0.0325];
-/// How far the finger tips reach below the centre of what is held, in metres.
-const TIP_BELOW_GRASP_M: f32 = 0.012;
+/// Half of a finger's width, thickness and length, in metres; these and the palm's are the simulated gripper's.
+const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, 0.0215];
+/// How far the finger tips reach below the gripper's reference point, in metres.
+const TIP_M: f32 = 0.028;
 /// Half of the palm's edges, in metres.
-const PALM_HALF_M: [f32; 3] = [0.016, 0.05, 0.01];
-/// Radius and half of the length of the stem above the palm, in metres.
+const PALM_HALF_M: [f32; 3] = [0.013, 0.044, 0.008];
+/// Half of the edges of the stem above the palm, in metres. It is only shown.
 const STEM_HALF_M: [f32; 3] = [0.01, 0.01, 0.03];
 
 /// Logs the gripper at all frames.
@@ -33,7 +32,7 @@ pub(super) fn put(store: &mut Store, episode: &Episode) -> Result<(), VisualizeE
 
 /// Height of the fingers' centres over the gripper's reference point.
 fn finger_z() -> f32 {
-    FINGER_HALF_M[2] - GRASP_M - TIP_BELOW_GRASP_M
+    FINGER_HALF_M[2] - TIP_M
 }
 
 fn put_fingers(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {

@@ -52,7 +52,7 @@ impl Store {
         path: impl Into<EntityPath>,
         what: &dyn AsComponents,
     ) -> Result<(), VisualizeError> {
-        self.put(path.into(), what, [], None)
+        self.put(&path.into(), what, [], None)
     }
 
     /// Logs one row with all instances.
@@ -62,7 +62,7 @@ impl Store {
         times: impl IntoIterator<Item = TimeColumn>,
         what: &dyn AsComponents,
     ) -> Result<(), VisualizeError> {
-        self.put(path.into(), what, times, None)
+        self.put(&path.into(), what, times, None)
     }
 
     /// Logs one row a time, one instance a row.
@@ -74,7 +74,7 @@ impl Store {
     ) -> Result<(), VisualizeError> {
         let times: Vec<TimeColumn> = times.into_iter().collect();
         let n_rows = times.first().map_or(0, TimeColumn::num_rows);
-        self.put(path.into(), what, times, Some(&vec![1; n_rows]))
+        self.put(&path.into(), what, times, Some(&vec![1; n_rows]))
     }
 
     /// Logs one row a time; `lengths` says how many instances each row has. A row of none clears the entity.
@@ -85,12 +85,12 @@ impl Store {
         what: &dyn AsComponents,
         lengths: &[usize],
     ) -> Result<(), VisualizeError> {
-        self.put(path.into(), what, times, Some(lengths))
+        self.put(&path.into(), what, times, Some(lengths))
     }
 
     fn put(
         &mut self,
-        path: EntityPath,
+        path: &EntityPath,
         what: &dyn AsComponents,
         times: impl IntoIterator<Item = TimeColumn>,
         lengths: Option<&[usize]>,
@@ -98,7 +98,7 @@ impl Store {
         if lengths.is_some_and(<[usize]>::is_empty) {
             return Ok(());
         }
-        let message = self.chunk(path.clone(), what, times, lengths);
+        let message = self.chunk(path, what, times, lengths);
         let message =
             message.map_err(|source| VisualizeError::Data { entity: path.to_string(), source: Box::new(source) })?;
         self.messages.push(message);
@@ -107,7 +107,7 @@ impl Store {
 
     fn chunk(
         &self,
-        path: EntityPath,
+        path: &EntityPath,
         what: &dyn AsComponents,
         times: impl IntoIterator<Item = TimeColumn>,
         lengths: Option<&[usize]>,
@@ -124,7 +124,7 @@ impl Store {
             })
             .collect::<Result<_, _>>()?;
         let times = times.into_iter().map(|column| (*column.timeline().name(), column)).collect();
-        let chunk = Chunk::from_auto_row_ids(self.next_id(), path, times, columns.into_iter().collect())?;
+        let chunk = Chunk::from_auto_row_ids(self.next_id(), path.clone(), times, columns.into_iter().collect())?;
         Ok(LogMsg::ArrowMsg(self.id.clone(), chunk.to_arrow_msg()?))
     }
 

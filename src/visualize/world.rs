@@ -13,6 +13,8 @@ use crate::visualize::{VisualizeError, clock, lanes, palette};
 /// With more movable bodies than this, their names would hide the scene; they are shown on hovering anyway.
 const MAX_LABELLED: usize = 12;
 const TABLE_THICKNESS_M: f32 = 0.02;
+/// Half of the thickness of drawn edges.
+const EDGE_RADIUS_M: f32 = 0.001;
 /// Space between a body and the mark around it.
 const TARGET_MARGIN_M: f32 = 0.006;
 
@@ -110,7 +112,10 @@ fn open_box([half_x, half_y, height]: [f32; 3], wall: f32) -> Boxes3D {
         [half_x, half_wall, height / 2.0],
         [half_x, half_wall, height / 2.0],
     ];
-    Boxes3D::from_centers_and_half_sizes(centers, half_sizes).with_fill_mode(FillMode::Solid)
+    // What lies inside is to be seen through the walls.
+    Boxes3D::from_centers_and_half_sizes(centers, half_sizes)
+        .with_fill_mode(FillMode::TransparentFillMajorWireframe)
+        .with_radii([EDGE_RADIUS_M])
 }
 
 /// A wireframe around the body that the running `move_to` goes to.
@@ -126,7 +131,7 @@ fn put_target(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError
     let boxes =
         Boxes3D::from_centers_and_half_sizes(centers, half_sizes)
             .with_colors(vec![palette::color(palette::TARGET); n_boxes]);
-    let style = Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.001]);
+    let style = Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([EDGE_RADIUS_M]);
     store.put_static("world/target", &style)?;
     store.put_ragged_rows("world/target", clock::times(&episode.frames, &positions), &boxes, &lengths)
 }

@@ -3,20 +3,22 @@
 //!
 //! `cargo bench --bench throughput` measures all; `cargo bench --bench throughput -- NAME …` those named.
 
+#![expect(clippy::print_stdout, reason = "its result is what it prints")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cpu_time::ProcessTime;
 use ntp::dataset::{ConvertConfig, DatasetTrials, RecordingEpisodes, convert, read_trials};
 use ntp::expert::demonstrate;
-use ntp::model::Decoder;
+use ntp::model::{Decoder, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
 use ntp::trace::{Actor, Episode, Provenance};
-use ntp::training::{Hooks, TrainConfig, train};
+use ntp::training::{Hooks, TrainConfig, Training, train};
 
 /// Runs the convert stage alone, in a process of its own, and prints its peak memory.
 const CONVERT_CHILD: &str = "--convert-child";
@@ -157,8 +159,9 @@ impl Bench {
     /// Decisions learned from in training, batch building included.
     fn train_samples(&self, trials: &DatasetTrials) {
         let config = TrainConfig { steps: 60, checkpoint_every: 1000, ..TrainConfig::default() };
+        let training = Training { variant: Variant::Ntp, seed: 0, config };
         let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
-        let (summary, secs) = cpu_secs(|| train(&config, trials, &self.folder.join("model"), &mut hooks));
+        let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join("model"), &mut hooks));
         let summary = summary.expect("training goes well");
         report("train_samples", summary.examples as f64 / secs, "decisions per CPU-second");
     }

@@ -7,7 +7,7 @@ work=$2
 mkdir -p "$work"
 venv="${XDG_CACHE_HOME:-$HOME/.cache}/ntp/foreign-venv"
 if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
-"$venv/bin/pip" install --quiet --disable-pip-version-check mcap mcap-protobuf-support pyarrow polars duckdb rerun-sdk==0.36.3
+"$venv/bin/pip" install --quiet --disable-pip-version-check mcap mcap-protobuf-support pyarrow pandas polars duckdb rerun-sdk==0.36.3
 
 for recording in "$run"/recordings/*.mcap; do
     "$venv/bin/python" "$here/mcap_reads.py" "$recording"

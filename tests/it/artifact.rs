@@ -1,5 +1,4 @@
 //! Files that are whole or not there.
-#![cfg(test)]
 
 use std::collections::BTreeMap;
 use std::io::Write as _;

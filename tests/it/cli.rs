@@ -1,5 +1,4 @@
 //! The process boundary: streams, exit codes, help.
-#![cfg(test)]
 
 use assert_cmd::Command;
 

@@ -1,20 +1,38 @@
 //! The one integration binary. Each module is named for what its tests claim something about.
 
+#[cfg(test)]
 mod architecture;
+#[cfg(test)]
 mod artifact;
+#[cfg(test)]
 mod cli;
+#[cfg(test)]
 mod dataset;
+#[cfg(test)]
 mod expert;
+#[cfg(test)]
 mod kinematic;
+#[cfg(test)]
 mod model;
+#[cfg(test)]
 mod pipeline;
+#[cfg(test)]
 mod recording;
+#[cfg(test)]
 mod report;
+#[cfg(test)]
 mod rollout;
+#[cfg(test)]
 mod schemas;
+#[cfg(test)]
 mod sim;
+#[cfg(test)]
 mod table;
+#[cfg(test)]
 mod task;
+#[cfg(test)]
 mod trace;
+#[cfg(test)]
 mod training;
+#[cfg(test)]
 mod visualize;

@@ -1,5 +1,4 @@
 //! Runs as a whole: the shortest pipeline through every stage, and what happens when a run is broken off.
-#![cfg(test)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -1,7 +1,5 @@
 //! Reports: from rollouts and metrics tables to results, tables and the page.
 
-#![cfg(test)]
-
 use std::fs::File;
 use std::path::{Path, PathBuf};
 

@@ -154,6 +154,15 @@ fn what_falls_off_the_table_is_named() {
     assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
 }
 
+#[test]
+fn a_beam_that_stands_out_on_both_sides_is_carried() {
+    let beam = ntp::scene::Shape::Cuboid { half_extents_m: [0.1, 0.03, 0.03] };
+    let mut world = Table::default().with("beam", beam, [0.0, 0.0]).with("block", BLOCK, [0.0, 0.2]).world();
+    act_all(&mut world, &PICK_FIRST);
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
+    assert_eq!(world.state().held, Some(ntp::scene::BodyIndex(0)));
+}
+
 #[track_caller]
 fn check_refused(table: Table, expected: &str) {
     let (scene, initial) = table.parts();

@@ -1,7 +1,5 @@
 //! Tasks: sampling, splits, the task file and the import of the authors' file.
 
-#![cfg(test)]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

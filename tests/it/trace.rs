@@ -1,10 +1,9 @@
 //! The rules of the program tree: each one, broken on purpose, is named.
-#![cfg(test)]
 
 use ntp::program::Program;
 use ntp::scene::{BodyIndex, SlotIndex};
 use ntp::task::Split;
-use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, Span, TraceError};
+use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Span, TraceError};
 use proptest::prelude::*;
 
 use crate::kinematic::{demonstration, sorting, tower, trial};
@@ -40,7 +39,7 @@ fn frames_must_be_there_in_order_and_finite() {
         |error| *error == TraceError::NotFinite { frame: 1 },
     );
     check_refused(
-        |parts| drop(parts.frames[1].state.bodies_in_world.pop()),
+        |parts| parts.frames[1].state.bodies_in_world.truncate(7),
         |error| matches!(error, TraceError::BodyCount { frame: 1, found: 7, expected: 8 }),
     );
     check_refused(
@@ -63,6 +62,20 @@ fn a_callee_sees_what_its_caller_chose_and_nothing_beyond() {
         |parts| parts.specification_frames = 4,
         |problem| matches!(problem, CallProblem::BeyondSpecification { end: 9, frames: 4 }),
     );
+}
+
+#[test]
+fn a_span_that_ends_before_it_begins_is_refused() {
+    for spoil in [
+        |call: &mut ProgramCall| call.frames = Span { begin: 70, end: 0 },
+        |call: &mut ProgramCall| call.input = Span { begin: 2, end: 2 },
+        |call: &mut ProgramCall| call.output = Some(Span { begin: 1, end: 0 }),
+    ] {
+        check_call_refused(
+            |parts| spoil(&mut parts.calls[3]),
+            |problem| matches!(problem, CallProblem::EmptySpan { found } if found.is_empty()),
+        );
+    }
 }
 
 #[test]

@@ -13,8 +13,8 @@ use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, Provenance, Span};
 use ntp::training::{
-    Curriculum, Example, Examples, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary, draw,
-    train,
+    Curriculum, Example, Examples, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
+    Training, draw, train,
 };
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
@@ -41,6 +41,14 @@ fn demonstrations(tasks: &[Task], n_trials: u32) -> DatasetTrials {
 
 fn towers() -> DatasetTrials {
     demonstrations(&[tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3], Split::Seen)], 3)
+}
+
+fn ntp(config: TrainConfig) -> Training {
+    Training { variant: Variant::Ntp, seed: 0, config }
+}
+
+fn resolved(config: TrainConfig) -> TrainConfig {
+    ntp(config).resolved().config
 }
 
 fn span(begin: u32, end: u32) -> Span {
@@ -125,7 +133,7 @@ fn unseen_tasks_are_never_learned_from() {
 fn a_mini_batchs_targets_sum_to_one_over_its_parts() {
     let data = towers();
     let examples = Examples::new(&data).unwrap();
-    let config = TrainConfig::default().resolved();
+    let config = resolved(TrainConfig::default());
     for level in 0..examples.levels().count() {
         let parts = draw(&examples, &config, level, 48, Seed(4));
         let sum = |values: &dyn Fn(&ntp::training::Part) -> f32| parts.iter().map(values).sum::<f32>();
@@ -142,7 +150,7 @@ fn a_mini_batchs_targets_sum_to_one_over_its_parts() {
 fn a_gripper_is_jittered_only_where_the_decision_stays_right() {
     let data = towers();
     let examples = Examples::new(&data).unwrap();
-    let always = TrainConfig { gripper_jitter: Some(1.0), ..TrainConfig::default() }.resolved();
+    let always = resolved(TrainConfig { gripper_jitter: Some(1.0), ..TrainConfig::default() });
     let never = TrainConfig { gripper_jitter: Some(0.0), ..always.clone() };
     let states = |config: &TrainConfig, level: usize| -> Vec<Vec<f32>> {
         let parts = draw(&examples, config, level, 32, Seed(4));
@@ -156,7 +164,7 @@ fn a_gripper_is_jittered_only_where_the_decision_stays_right() {
 
 /// Trains into a folder, stopping after some steps when asked to.
 fn train_until(
-    config: &TrainConfig,
+    training: &Training,
     data: &DatasetTrials,
     folder: &Path,
     stop: Option<u32>,
@@ -164,17 +172,17 @@ fn train_until(
     let done = Cell::new(0);
     let mut on_progress = |progress: ntp::training::Progress| done.set(progress.step);
     let should_stop = || stop.is_some_and(|stop| done.get() >= stop);
-    train(config, data, folder, &mut Hooks { on_progress: &mut on_progress, should_stop: &should_stop })
+    train(training, data, folder, &mut Hooks { on_progress: &mut on_progress, should_stop: &should_stop })
 }
 
-fn weights(config: &TrainConfig, data: &DatasetTrials) -> Vec<u8> {
+fn weights(training: &Training, data: &DatasetTrials) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
-    train_until(config, data, folder.path(), None).unwrap();
+    train_until(training, data, folder.path(), None).unwrap();
     std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
 }
 
-fn short(variant: Variant) -> TrainConfig {
-    TrainConfig { variant, steps: 6, batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
+fn short() -> TrainConfig {
+    TrainConfig { steps: 6, batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
 }
 
 #[test]
@@ -182,10 +190,11 @@ fn the_same_seed_gives_the_same_weights_for_any_number_of_threads() {
     let data = towers();
     for variant in Variant::ALL {
         let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-        let on = |n| pool(n).install(|| weights(&short(variant), &data));
+        let training = Training { variant, ..ntp(short()) };
+        let on = |n| pool(n).install(|| weights(&training, &data));
         let one = on(1);
         assert!(one == on(2) && one == on(3));
-        assert!(one != weights(&TrainConfig { seed: 1, ..short(variant) }, &data));
+        assert!(one != weights(&Training { seed: 1, ..training }, &data));
     }
 }
 
@@ -193,7 +202,8 @@ fn the_same_seed_gives_the_same_weights_for_any_number_of_threads() {
 fn forty_steps_are_twenty_and_twenty_more() {
     let data = towers();
     for curriculum in [Curriculum::Equal, Curriculum::Adaptive] {
-        let config = TrainConfig { steps: 40, batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() };
+        let config =
+            ntp(TrainConfig { steps: 40, batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() });
         let (straight, resumed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let whole = train_until(&config, &data, straight.path(), None).unwrap();
         let stopped = train_until(&config, &data, resumed.path(), Some(20)).unwrap_err();
@@ -213,9 +223,9 @@ fn forty_steps_are_twenty_and_twenty_more() {
 fn a_checkpoint_of_another_training_is_not_taken_and_a_broken_one_is_named() {
     let data = towers();
     let folder = tempfile::tempdir().unwrap();
-    let config = TrainConfig { batch: 8, ..short(Variant::Ntp) };
+    let config = ntp(TrainConfig { batch: 8, ..short() });
     train_until(&config, &data, folder.path(), Some(3)).unwrap_err();
-    let other = TrainConfig { seed: 9, ..config.clone() };
+    let other = Training { seed: 9, ..config.clone() };
     let file = folder.path().join("checkpoint/step-00000003.adam");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
@@ -228,11 +238,11 @@ fn a_checkpoint_of_another_training_is_not_taken_and_a_broken_one_is_named() {
 fn a_models_folder_tells_how_it_was_made() {
     let data = towers();
     let folder = tempfile::tempdir().unwrap();
-    let summary = train_until(&short(Variant::Ntp), &data, folder.path(), None).unwrap();
+    let summary = train_until(&ntp(short()), &data, folder.path(), None).unwrap();
     let config: ModelConfig = ntp::artifact::read_json(&folder.path().join(CONFIG_FILE)).unwrap();
     assert_eq!((config.variant, config.family, config.n_slots), (Variant::Ntp, Family::BlockStacking, 8));
-    let training: TrainConfig = serde_json::from_value(config.training).unwrap();
-    assert_eq!(training, short(Variant::Ntp).resolved());
+    let training: Training = serde_json::from_value(config.training).unwrap();
+    assert_eq!(training, ntp(short()).resolved());
     let mut table = ntp::table::read(&folder.path().join(METRICS_FILE), &TableSchema::METRICS).unwrap();
     let steps = table.int64("step").unwrap();
     assert_eq!(steps, summary.metrics.iter().map(|metric| i64::from(metric.step)).collect::<Vec<_>>());
@@ -243,11 +253,11 @@ fn a_models_folder_tells_how_it_was_made() {
 fn data_and_settings_that_make_no_sense_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |config: &TrainConfig, data: &DatasetTrials| {
-        let error = train_until(config, data, folder.path(), None).unwrap_err();
+        let error = train_until(&ntp(config.clone()), data, folder.path(), None).unwrap_err();
         assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "something was written");
         error
     };
-    let config = short(Variant::Ntp);
+    let config = short();
     let unseen = demonstrations(&[tower("c", &[6, 7], Split::Unseen)], 2);
     assert!(matches!(refused(&config, &unseen), TrainError::NoTrials { total: 2 }));
     let mut broken = towers();
@@ -263,7 +273,7 @@ fn data_and_settings_that_make_no_sense_are_refused() {
     assert!(matches!(refused(&none, &towers()), TrainError::Config { key: "steps", .. }));
     let much = TrainConfig { gripper_jitter: Some(1.5), ..config };
     let error = refused(&much, &towers()).to_string();
-    assert_eq!(error, "train.gripper_jitter is 1.5; allowed: from 0 to 1");
+    assert_eq!(error, "gripper_jitter is 1.5; allowed: from 0 to 1");
 }
 
 /// Success of a model's policy on tasks it has not seen, one rollout each.
@@ -293,7 +303,7 @@ fn a_short_training_stacks_unseen_towers() {
     let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
     let folder = tempfile::tempdir().unwrap();
     let config = TrainConfig { steps: 300, gripper_jitter: Some(0.0), ..TrainConfig::default() };
-    let summary = train_until(&config, &demonstrations(&seen, 10), folder.path(), None).unwrap();
+    let summary = train_until(&ntp(config), &demonstrations(&seen, 10), folder.path(), None).unwrap();
     let (first, root) = (&summary.metrics[0], last(&summary.metrics, Program::BlockStacking));
     assert!(root.loss_total < 0.1 * first.loss_total, "{} of {}", root.loss_total, first.loss_total);
     for level in [Program::Pick, Program::Place] {

@@ -158,7 +158,7 @@ fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
     let component = rerun::StateChange::descriptor_state().component;
     let labels = chunk.iter_slices::<String>(component);
     let label = |row: Vec<rerun::external::re_types_core::ArrowString>| {
-        row.first().map(|label| label.to_string()).unwrap_or_default()
+        row.first().map(ToString::to_string).unwrap_or_default()
     };
     times(chunk, "frame").into_iter().zip(labels.map(label)).collect()
 }

@@ -9,10 +9,10 @@ use crate::dataset::feature::{FEATURES, Feature};
 use crate::dataset::finding::Validation;
 use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::layout::{self, FilePlace};
-use crate::dataset::schema::{SUBTASKS, TASKS};
+use crate::dataset::schema::{FRAMES, SUBTASKS, TASKS};
 use crate::dataset::statistics::FeatureStatistics;
 use crate::program::vocabulary_hash;
-use crate::table;
+use crate::table::{self, TableReader};
 
 /// Texts that frames refer to, and the range that observations should have. Empty where they could not be read.
 #[derive(Default)]
@@ -50,6 +50,10 @@ pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
     note(tasks.map(|tasks| texts.tasks = tasks));
     let subtasks = read_texts(root, layout::SUBTASKS, &SUBTASKS, ["subtask_index", "subtask"]);
     note(subtasks.map(|subtasks| texts.subtasks = subtasks));
+    for (file, schema, text) in [(layout::TASKS, &TASKS, "__index_level_0__"), (layout::SUBTASKS, &SUBTASKS, "subtask")]
+    {
+        check_pandas_index(root, file, schema, text, validation);
+    }
     let info = read_json::<Info>(&root.join(layout::INFO));
     // A file of totals that cannot be read is found when the episodes are.
     if let Ok(info) = info {
@@ -134,6 +138,18 @@ fn read_texts(
     Ok(texts)
 }
 
+/// Checks that pandas makes the text the index of the table: `LeRobot` takes it from there.
+fn check_pandas_index(root: &Path, file: &str, schema: &table::TableSchema, text: &str, validation: &mut Validation) {
+    let path = root.join(file);
+    let Ok(reader) = TableReader::open_columns(&path, schema, &[text]) else { return };
+    let pandas = reader.metadata("pandas").and_then(|json| serde_json::from_str::<serde_json::Value>(json).ok());
+    if pandas.is_none_or(|pandas| pandas["index_columns"] != serde_json::json!([text])) {
+        let message =
+            format!("pandas metadata does not make {text:?} the index: LeRobot would take row numbers for texts");
+        validation.error("tasks.index", &path, String::new(), message);
+    }
+}
+
 /// Checks that every numeric feature has statistics in order; returns the range of observations.
 fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Option<(Vec<f64>, Vec<f64>)> {
     let path = root.join(layout::STATS);
@@ -173,14 +189,23 @@ fn statistics_problem(statistics: &FeatureStatistics, feature: &Feature, info: &
         .map(|at| format!("dimension {at}: minimum, quantiles, maximum are not in order"))
 }
 
-/// Files that no episode names, but that `LeRobot` would read: it takes all that lie there.
-pub(super) fn check_unlisted(root: &Path, data: &BTreeSet<FilePlace>, validation: &mut Validation) {
+/// Files that no episode names and columns that are not declared: `LeRobot` takes all files that lie there, and refuses
+/// columns that it does not know of.
+pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &mut Validation) {
     let listed: BTreeSet<PathBuf> = data.iter().map(|place| place.in_dataset(root, layout::DATA)).collect();
     let mut found: Vec<PathBuf> = files_below(&root.join(layout::DATA)).unwrap_or_default();
     found.sort_unstable();
     for path in found.iter().filter(|path| !listed.contains(*path)) {
         let message = "no episode is in this file, but readers that take all files of the folder would read it";
         validation.error("file.unlisted", path, String::new(), message.to_owned());
+    }
+    for path in &listed {
+        let Ok(reader) = TableReader::open_columns(path, &FRAMES, &["index"]) else { continue };
+        let known = |name: &&str| FEATURES.iter().any(|feature| feature.name == *name);
+        if let Some(name) = reader.file_columns().find(|name| !known(name)) {
+            let message = format!("column {name:?} is not declared in {}", layout::INFO);
+            validation.error("file.undeclared", path, String::new(), message);
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! How often a scripted expert succeeds in physics.
 
 use ntp::expert::demonstrate;
-use ntp::robot::RobotApi as _;
 use ntp::scene::{BodyIndex, SlotIndex, lies_inside};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
