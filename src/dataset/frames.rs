@@ -102,7 +102,7 @@ impl FrameRows {
             self.index.push(ids.first_index + row as i64);
             self.done.push(is_last);
             self.success.push(is_last && is_success);
-            self.time_secs.push(frame.time_nanos as f64 * 1e-9);
+            self.time_secs.push(frame.time_nanos as f64 / 1e9);
             self.boundary.push(frame.boundary);
             self.recording_frame.push(i64::from(recorded));
             let gripper = frame.state.gripper_in_world.translation.vector;

@@ -172,11 +172,10 @@ impl FrameCheck {
     /// Compares what was seen with `meta/stats.json`.
     pub(super) fn compare_ranges(&self, root: &Path, texts: &Texts, validation: &mut Validation) {
         let Some((min, max)) = &texts.state_range else { return };
-        let seen = self.range.iter().map(|(min, max)| (f64::from(*min), f64::from(*max)));
-        let stated = min.iter().copied().zip(max.iter().copied());
-        if let Some((dimension, (seen, stated))) =
-            seen.zip(stated).enumerate().find(|(_, (seen, stated))| seen != stated)
-        {
+        // As floats: they were, before they became decimals.
+        let stated = min.iter().zip(max).map(|(min, max)| (*min as f32, *max as f32));
+        let pairs = self.range.iter().copied().zip(stated).enumerate();
+        if let Some((dimension, (seen, stated))) = pairs.into_iter().find(|(_, (seen, stated))| seen != stated) {
             let message = format!(
                 "dimension {dimension} is from {} to {}, but the rows are from {} to {}",
                 stated.0, stated.1, seen.0, seen.1
