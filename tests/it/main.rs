@@ -24,6 +24,7 @@ mod report;
 mod rollout;
 #[cfg(test)]
 mod schemas;
+#[cfg(test)]
 mod schemas_parquet;
 #[cfg(test)]
 mod sim;
