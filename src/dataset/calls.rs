@@ -141,8 +141,7 @@ impl ScopeRows {
     /// What the schema text cannot say of this table.
     pub(crate) fn options() -> WriteOptions {
         WriteOptions {
-            plain: vec!["label"],
-            delta_encoded: vec!["episode_index", "call_id", "specification_frame"],
+            delta_encoded: vec!["episode_index", "call_id", "specification_frame", "label"],
             sorted_by: vec!["episode_index", "call_id"],
             ..WriteOptions::default()
         }

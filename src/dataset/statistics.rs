@@ -23,6 +23,9 @@ use number::{copy_keys, copy_values, key_of};
 use quantile::Selector;
 use spool::Spool;
 
+/// Rows of a block of the temporary file: few enough to stay in a processor's cache.
+const BLOCK_ROWS: usize = 256;
+
 /// The quantiles of [`FeatureStatistics`].
 const QUANTILES: [f64; 5] = [0.01, 0.1, 0.5, 0.9, 0.99];
 
@@ -132,13 +135,22 @@ impl Statistics {
     }
 
     /// Adds an episode: some rows of the features' columns.
-    pub(crate) fn append(&mut self, columns: &[(&str, Values<'_>)], rows: &Range<usize>) -> Result<(), IoError> {
-        self.spool.begin_block(rows.len())?;
+    pub(crate) fn append(&mut self, columns: &[(&str, Values<'_>)], rows: &Range<usize>) {
         for (gathered, (_, column)) in self.features.iter_mut().zip(columns) {
             copy_values(*column, rows.clone(), &mut self.values);
             gathered.append(&self.values);
-            copy_keys(*column, rows.clone(), &mut self.bytes);
-            self.spool.append(&self.bytes)?;
+        }
+    }
+
+    /// Keeps the first rows of the features' columns for the quantiles of the whole.
+    pub(crate) fn keep(&mut self, columns: &[(&str, Values<'_>)], n_rows: usize) -> Result<(), IoError> {
+        for begin in (0..n_rows).step_by(BLOCK_ROWS) {
+            let rows = begin..n_rows.min(begin + BLOCK_ROWS);
+            self.spool.begin_block(rows.len())?;
+            for (_, (_, column)) in self.features.iter().zip(columns) {
+                copy_keys(*column, rows.clone(), &mut self.bytes);
+                self.spool.append(&self.bytes)?;
+            }
         }
         Ok(())
     }

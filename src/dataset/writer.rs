@@ -179,7 +179,7 @@ impl Tables {
         let (episode_index, first_index) = (places.episode_index, places.first_index);
         let first_row = self.frames.n_rows();
         self.frames.append(view, EpisodeIds { episode_index, first_index, task_index, fps });
-        self.statistics.append(&self.frames.columns(), &(first_row..self.frames.n_rows()))?;
+        self.statistics.append(&self.frames.columns(), &(first_row..self.frames.n_rows()));
         self.calls.append(view, episode_index);
         self.provenance.append(view, source, places);
         self.meta.append(view, places, self.meta_files.place());
@@ -222,7 +222,9 @@ impl Tables {
     }
 
     fn write_frames(&mut self) -> Result<(), ConvertError> {
-        self.data_files.write_row_group(&self.frames.columns())?;
+        let columns = self.frames.columns();
+        self.statistics.keep(&columns, self.frames.n_rows())?;
+        self.data_files.write_row_group(&columns)?;
         self.frames.clear();
         Ok(())
     }

@@ -12,7 +12,7 @@ use crate::dataset::statistics::quantile::Selector;
 
 const BUFFER_BYTES: usize = 1 << 18;
 
-/// The keys of each episode and column, in the order of writing.
+/// The keys of some rows at a time, column by column.
 pub(super) struct Spool {
     folder: PathBuf,
     file: BufWriter<File>,
@@ -27,13 +27,13 @@ impl Spool {
         Ok(Self { folder: folder.to_owned(), file, n_blocks: 0 })
     }
 
-    /// Begins an episode of `n_rows` rows.
+    /// Begins a block of `n_rows` rows.
     pub(super) fn begin_block(&mut self, n_rows: usize) -> Result<(), IoError> {
         self.n_blocks += 1;
         self.append(&(n_rows as u64).to_le_bytes())
     }
 
-    /// Adds a column of the episode.
+    /// Adds a column of the block.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), IoError> {
         self.file.write_all(bytes).map_err(IoError::system("write a temporary file in", &self.folder))
     }
