@@ -40,7 +40,7 @@ pub enum Command {
     Report(StageArgs),
     /// Say what a file or folder is: recording, dataset, model, rollouts, run.
     Inspect(PathArgs),
-    /// Check every cross-reference and checksum of a file or folder.
+    /// Check the checksums and the content of a file or folder.
     Validate(PathArgs),
     /// Show an episode of a recording in Rerun, or simulate it again.
     Replay(ReplayArgs),

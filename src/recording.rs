@@ -8,7 +8,7 @@
 //!
 //! | topic | message | when |
 //! |---|---|---|
-//! | `/ntp/episode/start`, `/ntp/episode/end` | `ntp.v1.EpisodeStart`, `EpisodeEnd` | provenance, scene; outcome, counts |
+//! | `/ntp/episode/start`, `/end` | `ntp.v1.EpisodeStart`, `EpisodeEnd` | provenance, scene; outcome, counts |
 //! | `/tf` | `foxglove.FrameTransforms` | each frame: gripper, and bodies that moved; the first frame: all |
 //! | `/ntp/observation` | `ntp.v1.Observation` | each frame: what is not a pose |
 //! | `/ntp/call`, `/ntp/return` | `ntp.v1.ProgramCall`, `ProgramReturn` | each program call and its return |
@@ -34,12 +34,14 @@ mod container;
 mod error;
 mod index;
 mod inspect;
+mod observation;
 mod reader;
 mod schema;
 mod start;
 mod stream;
 mod transform;
 mod viewer;
+mod wire;
 mod writer;
 
 pub use error::{Damage, EpisodeProblem, MessageProblem, RecordingError};

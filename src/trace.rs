@@ -12,11 +12,13 @@ mod episode;
 mod frame;
 mod outcome;
 mod recorder;
+mod rules;
 mod span;
 
 pub use call::{CallId, Prediction, ProgramCall};
-pub use episode::{Actor, CallProblem, Episode, EpisodeParts, Provenance, TraceError, check_calls};
+pub use episode::{Actor, Episode, EpisodeParts, Provenance};
 pub use frame::{Frame, Observation};
 pub use outcome::{Cause, Outcome};
 pub use recorder::{CallRecorder, NewCall};
+pub use rules::{CallProblem, TraceError, check_calls};
 pub use span::{ScopingLabel, Span};

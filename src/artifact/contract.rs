@@ -267,12 +267,12 @@ impl StageDir {
         write_json(&self.receipt_path(receipt.shard), receipt)
     }
 
-    /// Commits the stage from its receipts.
+    /// Commits the stage from its receipts, and the files that were made of all shards together.
     ///
     /// # Errors
     ///
     /// [`ContractError::MissingShards`] when a receipt is missing.
-    pub fn commit(&self, plan: &Plan) -> Result<Manifest, ContractError> {
+    pub fn commit(&self, plan: &Plan, of_all_shards: &[&str]) -> Result<Manifest, ContractError> {
         let mut receipts = Vec::new();
         let mut missing = Vec::new();
         for shard in 0..plan.shards {
@@ -284,13 +284,15 @@ impl StageDir {
         if !missing.is_empty() {
             return Err(ContractError::MissingShards { stage: self.stage.clone(), missing, total: plan.shards });
         }
+        let together: Vec<FileEntry> =
+            of_all_shards.iter().map(|file| FileEntry::of(&self.path, file)).collect::<Result<_, _>>()?;
         let manifest = Manifest {
             version: CONTRACT_VERSION,
             stage: self.stage.clone(),
             plan_id: plan.id(),
             episodes: receipts.iter().map(|receipt| receipt.episodes).sum(),
             failed: receipts.iter().map(|receipt| receipt.failed).sum(),
-            files: receipts.into_iter().flat_map(|receipt| receipt.files).collect(),
+            files: receipts.into_iter().flat_map(|receipt| receipt.files).chain(together).collect(),
         };
         write_json(&self.manifest_path(), &manifest)?;
         Ok(manifest)

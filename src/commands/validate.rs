@@ -1,4 +1,4 @@
-//! `ntp validate PATH`: every checksum, count and cross-reference; each finding has a code.
+//! `ntp validate PATH`: checksums, and what the files hold; each finding has a code.
 
 use std::path::{Path, PathBuf};
 

@@ -50,7 +50,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         failed: summary.failed_left_out + summary.failed_included,
         files: entries?,
     })?;
-    partial.commit(&unit.plan)?;
+    partial.commit(&unit.plan, &[])?;
     unit.dir.clear()?;
     std::fs::rename(partial.path(), unit.dir.path()).map_err(IoError::system("rename to", unit.dir.path()))?;
     progress.finish(&format!("{} episodes, {} frames, {} calls", summary.episodes, summary.frames, summary.calls));

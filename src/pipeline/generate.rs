@@ -31,13 +31,10 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     unit.dir.begin(&unit.plan)?;
     let n_episodes = seen.len() as u64 * u64::from(context.pipeline.spec.generate.trials_per_task);
     let progress = context.progress(unit, n_episodes, "episodes");
-    let shards: Vec<u32> = match context.options.shard {
-        Some(shard) => vec![shard],
-        None => (0..unit.plan.shards).collect(),
-    };
+    let shards = context.shards(unit)?;
     shards.into_par_iter().try_for_each(|shard| work_shard(context, unit, &seen, shard, &progress))?;
     if context.options.shard.is_none() {
-        let manifest = unit.dir.commit(&unit.plan)?;
+        let manifest = unit.dir.commit(&unit.plan, &[])?;
         progress.finish(&format!("{} episodes, {} failed", manifest.episodes, manifest.failed));
     }
     Ok(())

@@ -44,7 +44,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let entries: Result<Vec<FileEntry>, IoError> =
         FILES.iter().map(|file| FileEntry::of(unit.dir.path(), file)).collect();
     unit.dir.commit_shard(&Receipt { plan_id: unit.plan.id(), shard: 0, episodes: 0, failed: 0, files: entries? })?;
-    unit.dir.commit(&unit.plan)?;
+    unit.dir.commit(&unit.plan, &[])?;
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::json;
 
 use crate::artifact::{FileEntry, Plan, Receipt};
-use crate::model::Decoder;
+use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
 use crate::pipeline::generate::{demonstrate, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
@@ -103,10 +103,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let suite = Suite { context, unit, spec, tasks: suite_tasks(context, &task_set, spec)?, learned };
     unit.dir.begin(&unit.plan)?;
     let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
-    let shards: Vec<u32> = match context.options.shard {
-        Some(shard) => vec![shard],
-        None => (0..unit.plan.shards).collect(),
-    };
+    let shards = context.shards(unit)?;
     shards.into_par_iter().try_for_each(|shard| suite.shard(shard, &progress))?;
     if context.options.shard.is_none() {
         finish(unit, &progress)?;
@@ -118,6 +115,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
 /// demonstrations.
 struct Learned {
     folder: PathBuf,
+    variant: Variant,
     decoder: Decoder,
     seed: u64,
 }
@@ -125,7 +123,19 @@ struct Learned {
 fn learned(context: &Context<'_>, model: usize, seed: u64) -> Learned {
     let spec = &context.pipeline.spec.models[model];
     let name = model_name(spec.variant, spec.train_tasks, seed);
-    Learned { folder: context.dir.model(&name).path().to_owned(), decoder: spec.decoder, seed }
+    let folder = context.dir.model(&name).path().to_owned();
+    Learned { folder, variant: spec.variant, decoder: spec.decoder, seed }
+}
+
+impl Learned {
+    /// Refuses a model that was made for another family, another number of slots, or as another variant.
+    fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
+        let (found, policy) = load_policy(&self.folder, self.decoder)?;
+        let family = context.pipeline.spec.tasks.family;
+        let wanted = ModelConfig::new(self.variant, family, family.n_slots(), found.training.clone());
+        check_purpose(&found, &wanted, &self.folder)?;
+        Ok(policy)
+    }
 }
 
 fn suite_tasks<'t>(
@@ -156,7 +166,7 @@ fn finish(unit: &Unit, progress: &Progress) -> Result<(), PipelineError> {
         }
     }
     rows.write(&unit.dir.path().join(TABLE))?;
-    let manifest = unit.dir.commit(&unit.plan)?;
+    let manifest = unit.dir.commit(&unit.plan, &[TABLE])?;
     let succeeded = manifest.episodes - manifest.failed;
     progress.finish(&format!("{succeeded} of {} succeeded", manifest.episodes));
     Ok(())
@@ -230,7 +240,7 @@ impl Suite<'_> {
 
     fn act(&self, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
         let mut policy: Box<dyn Policy> = match &self.learned {
-            Some(learned) => load_policy(&learned.folder, learned.decoder)?.1,
+            Some(learned) => learned.policy(self.context)?,
             None => Box::new(Oracle::for_starts(&starts)),
         };
         let factor = self.context.pipeline.spec.rollout.decisions_factor;

@@ -91,6 +91,20 @@ impl Context<'_> {
         if self.options.stop.load(Ordering::Relaxed) { Err(PipelineError::Interrupted) } else { Ok(()) }
     }
 
+    /// The shards of a unit that are to be done: all, or the one that was asked for.
+    pub(super) fn shards(&self, unit: &Unit) -> Result<Vec<u32>, PipelineError> {
+        let n_shards = unit.plan.shards;
+        match self.options.shard {
+            None => Ok((0..n_shards).collect()),
+            Some(shard) if shard < n_shards => Ok(vec![shard]),
+            Some(shard) => Err(PipelineError::Value {
+                path: self.pipeline.path.clone(),
+                key: "--shard".to_owned(),
+                problem: format!("is {shard}; {} has shards 0 to {}", unit.name, n_shards.saturating_sub(1)),
+            }),
+        }
+    }
+
     /// Progress of one unit.
     pub(super) fn progress(&self, unit: &Unit, total: u64, what: &str) -> crate::progress::Progress {
         if self.options.progress {

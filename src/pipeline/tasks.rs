@@ -33,7 +33,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         files: vec![FileEntry::of(unit.dir.path(), FILE)?],
     };
     unit.dir.commit_shard(&receipt)?;
-    unit.dir.commit(&unit.plan)?;
+    unit.dir.commit(&unit.plan, &[])?;
     Ok(())
 }
 

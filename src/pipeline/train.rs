@@ -67,7 +67,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         failed: 0,
         files: files?,
     })?;
-    unit.dir.commit(&unit.plan)?;
+    unit.dir.commit(&unit.plan, &[])?;
     progress.finish(&format!("{} steps, {} examples", summary.steps, summary.examples));
     Ok(())
 }

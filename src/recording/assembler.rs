@@ -2,20 +2,20 @@
 
 use prost::Message as _;
 
-use super::calls;
 use super::error::MessageProblem;
+use super::observation::Observed;
 use super::schema::{Topic, proto};
 use super::start::{self, Start};
 use super::transform::{self, GRIPPER};
+use super::{calls, observation};
 use crate::geometry::Pose;
-use crate::scene::{BodyIndex, SceneState};
+use crate::scene::SceneState;
 use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall};
 
 /// Episodes being put together, one at a time. Its buffers are used again from message to message.
 #[derive(Default)]
 pub(super) struct Assembler {
     building: Option<Box<Building>>,
-    observation: proto::Observation,
     call: proto::ProgramCall,
     returned: proto::ProgramReturn,
 }
@@ -62,9 +62,8 @@ impl Assembler {
         match topic {
             Topic::Transforms => building.transforms(log_time_nanos, data)?,
             Topic::Observation => {
-                self.observation.clear();
-                self.observation.merge(data)?;
-                building.observation(log_time_nanos, &self.observation)?;
+                let observed = observation::decode(data, building.start.scene.slots.len())?;
+                building.observation(log_time_nanos, observed)?;
             }
             Topic::Call => {
                 self.call.clear();
@@ -117,7 +116,7 @@ impl Building {
         if self.transforms_at_nanos.replace(log_time_nanos).is_some() {
             return Err(MessageProblem::OutOfPlace("the transforms before have no observation"));
         }
-        transform::decode(data, |child, pose| {
+        transform::decode(log_time_nanos, data, |child, pose| {
             let position = self.place(child, pose)?;
             self.unplaced -= usize::from(!std::mem::replace(&mut self.placed[position], true));
             Ok(())
@@ -138,26 +137,17 @@ impl Building {
         Ok(position)
     }
 
-    fn observation(&mut self, log_time_nanos: u64, message: &proto::Observation) -> Result<(), MessageProblem> {
+    fn observation(&mut self, log_time_nanos: u64, observed: Observed) -> Result<(), MessageProblem> {
+        let Observed { frame, boundary, opening_m, held, slots } = observed;
         let transforms_nanos =
             self.transforms_at_nanos.take().ok_or(MessageProblem::Missing { field: "transforms" })?;
         expect("log time", log_time_nanos, transforms_nanos)?;
-        expect("frame", u64::from(message.frame), self.frames.len() as u64)?;
+        expect("frame", u64::from(frame), self.frames.len() as u64)?;
         if self.unplaced > 0 {
             return Err(MessageProblem::Missing { field: "transform of a body" });
         }
-        let body = |field| move |body: u32| start::narrow(field, body).map(BodyIndex);
-        let slots = message.slots.iter().copied().map(body("body of a slot"));
-        self.frames.push(Frame {
-            time_nanos: log_time_nanos - self.start_nanos,
-            boundary: message.boundary,
-            state: SceneState {
-                opening_m: message.opening_m,
-                held: message.held.map(body("held body")).transpose()?,
-                ..self.state.clone()
-            },
-            slots: slots.collect::<Result<_, _>>()?,
-        });
+        let state = SceneState { opening_m, held, ..self.state.clone() };
+        self.frames.push(Frame { time_nanos: log_time_nanos - self.start_nanos, boundary, state, slots });
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::McapError;
 use mcap::records::{ChunkIndex, MessageIndex, Record, Statistics, op};
 
-use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary, crc32};
+use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{Damage, RecordingError};
 use super::schema::{SCHEMA_VERSION, Topic};
 use super::stream::damaged;
@@ -229,7 +229,7 @@ fn check_metadata(path: &Path, metadata: &BTreeMap<String, String>) -> Result<Op
         return Err(RecordingError::Vocabulary { path: path.to_owned(), found: found.to_owned(), expected });
     }
     let family = metadata.get("task_family").map(|word| word.parse());
-    family.transpose().map_err(|_| foreign(path, "known task_family in its metadata"))
+    family.transpose().map_err(|_error| foreign(path, "known task_family in its metadata"))
 }
 
 /// Log time, create time, name, media type, length, data, checksum.
@@ -237,7 +237,7 @@ fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Resu
     let content = read_record(path, file, size, place, (op::ATTACHMENT, "attachment"))?;
     let broken = || broken(path, place.0, "attachment");
     let (checked, checksum) = content.split_last_chunk().ok_or_else(broken)?;
-    let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32(checked));
+    let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32fast::hash(checked));
     if saved != calculated {
         return Err(damaged(path, place.0, McapError::BadAttachmentCrc { saved, calculated }));
     }
@@ -249,7 +249,7 @@ fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Resu
         (length == fields.rest().len() as u64).then_some(fields.rest())
     };
     let data = data().ok_or_else(broken)?.to_vec();
-    String::from_utf8(data).map_err(|_| RecordingError::Damaged {
+    String::from_utf8(data).map_err(|_error| RecordingError::Damaged {
         path: path.to_owned(),
         offset: place.0,
         source: Damage::Text { record: PLAN },

@@ -91,10 +91,10 @@ pub(super) fn decode(message: proto::EpisodeStart) -> Result<Start, MessageProbl
     let unknown = |field, word: &str| MessageProblem::UnknownWord { field, word: word.to_owned() };
     let provenance = Provenance {
         index,
-        family: family.parse().map_err(|_| unknown("family", &family))?,
+        family: family.parse().map_err(|_error| unknown("family", &family))?,
         task_id,
         task_text,
-        split: split.parse().map_err(|_| unknown("split", &split))?,
+        split: split.parse().map_err(|_error| unknown("split", &split))?,
         trial,
         seed,
         counts: counts.into_iter().map(|count| narrow("count", count)).collect::<Result<_, _>>()?,
@@ -151,5 +151,5 @@ fn decode_shape(shape: &body::Shape) -> Shape {
 
 /// A number of the schema in a smaller type.
 pub(super) fn narrow<T: TryFrom<u32>>(field: &'static str, number: u32) -> Result<T, MessageProblem> {
-    T::try_from(number).map_err(|_| MessageProblem::OutOfRange { field, found: u64::from(number) })
+    T::try_from(number).map_err(|_error| MessageProblem::OutOfRange { field, found: u64::from(number) })
 }

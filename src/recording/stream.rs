@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use mcap::McapError;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use zstd::bulk::Decompressor;
 
-use super::container::{Fields, MAX_RECORD_BYTES};
+use super::container::{Fields, MAX_RECORD_BYTES, Records};
 use super::error::{Damage, RecordingError};
 use crate::artifact::IoError;
 
@@ -41,7 +42,7 @@ pub(super) struct Stream {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    chunk: Option<LinearReader>,
+    chunk: Chunk,
     /// How far the file has been read.
     offset: u64,
     last_log_time_nanos: u64,
@@ -65,8 +66,8 @@ impl Stream {
     }
 
     fn new(path: &Path, file: File, options: LinearReaderOptions, offset: u64) -> Self {
-        let reader = LinearReader::new_with_options(options.with_emit_chunks(true));
-        Self { path: path.to_owned(), file, reader, chunk: None, offset, last_log_time_nanos: 0 }
+        let reader = LinearReader::new_with_options(options);
+        Self { path: path.to_owned(), file, reader, chunk: Chunk::default(), offset, last_log_time_nanos: 0 }
     }
 
     /// Gives messages to `visit` until it breaks; `None` when there are no more.
@@ -76,45 +77,37 @@ impl Stream {
     ) -> Result<Option<T>, RecordingError> {
         loop {
             let Self { path, reader, chunk, offset, last_log_time_nanos, .. } = self;
-            let reading_chunk = chunk.is_some();
-            let (opcode, record) = match chunk.as_mut().unwrap_or(reader).next_event() {
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => (opcode, data),
-                Some(Ok(LinearReadEvent::ReadRequest(_))) => {
-                    self.read_on()?;
-                    continue;
-                }
-                // The chunk's record was whole, so it is its content that ends too early.
-                Some(Err(McapError::UnexpectedEof)) if reading_chunk => {
-                    return Err(damaged(path, *offset, McapError::UnexpectedEoc));
-                }
-                Some(Err(error)) => return Err(damaged(path, *offset, error)),
-                None if reading_chunk => {
-                    *chunk = None;
-                    continue;
-                }
-                None => return Ok(None),
-            };
-            match opcode {
-                op::CHUNK => *chunk = Some(chunk_reader(record).map_err(|error| damaged(path, *offset, error))?),
-                op::MESSAGE => {
-                    let message = RawMessage::parse(record, *offset);
-                    let message = message.ok_or_else(|| damaged(path, *offset, McapError::UnexpectedEoc))?;
-                    check_time(path, &message, last_log_time_nanos)?;
-                    if let ControlFlow::Break(value) = visit(&message)? {
-                        return Ok(Some(value));
+            let damaged = |error| damaged(path, *offset, error);
+            let (opcode, record) = if chunk.is_empty() {
+                match reader.next_event() {
+                    None => return Ok(None),
+                    Some(Err(error)) => return Err(damaged(error)),
+                    Some(Ok(LinearReadEvent::ReadRequest(_))) => {
+                        self.read_on()?;
+                        continue;
                     }
+                    Some(Ok(LinearReadEvent::Record { opcode: op::CHUNK, data })) => {
+                        chunk.fill(data).map_err(damaged)?;
+                        continue;
+                    }
+                    Some(Ok(LinearReadEvent::Record { opcode, data })) => (opcode, data),
                 }
-                _ => {}
+            } else {
+                chunk.next().map_err(damaged)?
+            };
+            if opcode != op::MESSAGE {
+                continue;
+            }
+            let message = RawMessage::parse(record, *offset).ok_or_else(|| damaged(McapError::UnexpectedEoc))?;
+            check_time(path, &message, last_log_time_nanos)?;
+            if let ControlFlow::Break(value) = visit(&message)? {
+                return Ok(Some(value));
             }
         }
     }
 
     /// What is asked for may be more, after a wrong length; so memory grows only with what is there.
     fn read_on(&mut self) -> Result<(), RecordingError> {
-        if let Some(chunk) = &mut self.chunk {
-            chunk.notify_read(0);
-            return Ok(());
-        }
         let n = loop {
             match self.file.read(self.reader.insert(READ_BYTES)) {
                 Ok(n) => break n,
@@ -129,35 +122,76 @@ impl Stream {
 }
 
 fn options() -> LinearReaderOptions {
-    LinearReaderOptions::default().with_prevalidate_chunk_crcs(true).with_record_length_limit(MAX_RECORD_BYTES)
+    LinearReaderOptions::default().with_emit_chunks(true).with_record_length_limit(MAX_RECORD_BYTES)
 }
 
-/// A reader of one chunk that has nothing else before it: where a damaged chunk ends before its stated size, the
-/// library asks the decompressor for more for ever if other bytes follow.
-fn chunk_reader(record: &[u8]) -> Result<LinearReader, McapError> {
-    let mut fields = Fields::new(record);
-    let mut header = || -> Option<(&[u8], u64)> {
-        let [_start_time, _end_time, _uncompressed_size] = [fields.u64()?, fields.u64()?, fields.u64()?];
-        let _checksum = fields.u32()?;
-        Some((fields.text()?, fields.u64()?))
-    };
-    let (compression, compressed_size) = header().ok_or(McapError::UnexpectedEoc)?;
-    let available = fields.rest().len() as u64;
-    if compressed_size != available {
-        return Err(McapError::BadChunkLength { header: compressed_size, available });
+/// The records of one chunk, decompressed at once.
+///
+/// The library can do it too, but it decompresses record by record at twice the cost, and where a damaged chunk ends
+/// before its stated size it asks the decompressor for more for ever.
+#[derive(Default)]
+struct Chunk {
+    content: Vec<u8>,
+    /// How much of the content has been given out.
+    position: usize,
+    decompressor: Option<Decompressor<'static>>,
+}
+
+impl Chunk {
+    /// Takes the place of the chunk before.
+    fn fill(&mut self, record: &[u8]) -> Result<(), McapError> {
+        let mut fields = Fields::new(record);
+        let mut header = || -> Option<_> {
+            let [_start_time, _end_time, uncompressed_size] = [fields.u64()?, fields.u64()?, fields.u64()?];
+            Some((uncompressed_size, fields.u32()?, fields.text()?, fields.u64()?))
+        };
+        let (uncompressed_size, saved, compression, header) = header().ok_or(McapError::UnexpectedEoc)?;
+        let (data, available) = (fields.rest(), fields.rest().len() as u64);
+        if header != available {
+            return Err(McapError::BadChunkLength { header, available });
+        }
+        let size = usize::try_from(uncompressed_size).ok().filter(|&size| size <= MAX_RECORD_BYTES);
+        self.content.clear();
+        self.position = 0;
+        match compression {
+            b"zstd" => self.decompress(data, size.ok_or(McapError::ChunkTooLarge(uncompressed_size))?)?,
+            b"" => self.content.extend_from_slice(data),
+            _ => return Err(McapError::UnsupportedCompression(String::from_utf8_lossy(compression).into_owned())),
+        }
+        let calculated = crc32fast::hash(&self.content);
+        if Some(self.content.len()) != size {
+            return Err(McapError::UnexpectedEoc);
+        }
+        // Zero says that there is none.
+        if saved != 0 && saved != calculated {
+            return Err(McapError::BadChunkCrc { saved, calculated });
+        }
+        Ok(())
     }
-    // Of uncompressed chunks the library does not check lengths.
-    if compression != b"zstd" {
-        return Err(McapError::UnsupportedCompression(String::from_utf8_lossy(compression).into_owned()));
+
+    fn decompress(&mut self, data: &[u8], size: usize) -> Result<(), McapError> {
+        let failed = |error: std::io::Error| McapError::DecompressionError(error.to_string());
+        let decompressor = match &mut self.decompressor {
+            Some(decompressor) => decompressor,
+            none => none.insert(Decompressor::new().map_err(failed)?),
+        };
+        self.content.reserve_exact(size);
+        decompressor.decompress_to_buffer(data, &mut self.content).map_err(failed)?;
+        Ok(())
     }
-    let options = options().with_skip_start_magic(true).with_skip_end_magic(true);
-    let mut reader = LinearReader::new_with_options(options);
-    let framing = [&[op::CHUNK][..], &(record.len() as u64).to_le_bytes()].concat();
-    for part in [&framing, record] {
-        reader.insert(part.len()).copy_from_slice(part);
-        reader.notify_read(part.len());
+
+    /// Whether all of it has been given out.
+    fn is_empty(&self) -> bool {
+        self.position == self.content.len()
     }
-    Ok(reader)
+
+    /// The next record: opcode and content.
+    fn next(&mut self) -> Result<(u8, &[u8]), McapError> {
+        let next = Records::new(&self.content[self.position..]).next();
+        let (opcode, content, whole) = next.ok_or(McapError::UnexpectedEoc)?;
+        self.position += whole.len();
+        Ok((opcode, content))
+    }
 }
 
 fn check_time(path: &Path, message: &RawMessage<'_>, last_nanos: &mut u64) -> Result<(), RecordingError> {

@@ -7,12 +7,11 @@
 //!
 //! Metres. Each transform is a child's pose in the world. f32 to f64 and back is exact.
 
-use prost::bytes::{Buf as _, BufMut as _};
-use prost::encoding::{
-    DecodeContext, WireType, decode_key, decode_varint, encode_varint, encoded_len_varint, skip_field,
-};
+use prost::bytes::BufMut as _;
+use prost::encoding::{WireType, encode_varint, encoded_len_varint};
 
 use super::error::MessageProblem;
+use super::wire;
 use crate::geometry::{Pose, Rotation, Vec3};
 
 /// The frame id of the world.
@@ -33,115 +32,171 @@ const ROTATION: u32 = 5;
 
 /// Writes a transform behind those that are there: any number of them, one after the other, is a `FrameTransforms`.
 pub(super) fn encode(log_time_nanos: u64, child: &str, child_in_world: &Pose, buffer: &mut Vec<u8>) {
-    let (seconds, nanos) = (log_time_nanos / 1_000_000_000, log_time_nanos % 1_000_000_000);
-    let stamp_len = 2 + encoded_len_varint(seconds) + encoded_len_varint(nanos);
-    let text_len = |text: &str| 1 + encoded_len_varint(text.len() as u64) + text.len();
-    let length = 2 + stamp_len + text_len(WORLD) + text_len(child) + (2 + 3 * 9) + (2 + 4 * 9);
-    put_length(TRANSFORMS, length, buffer);
-    put_length(TIMESTAMP, stamp_len, buffer);
-    for (field, number) in [(1, seconds), (2, nanos)] {
-        put_key(field, WireType::Varint, buffer);
-        encode_varint(number, buffer);
-    }
-    for (field, text) in [(PARENT, WORLD), (CHILD, child)] {
-        put_length(field, text.len(), buffer);
-        buffer.put_slice(text.as_bytes());
-    }
+    let head = Head::new(log_time_nanos);
+    let child_len = 1 + encoded_len_varint(child.len() as u64) + child.len();
+    put_length(TRANSFORMS, head.bytes().len() + child_len + POSE_BYTES, buffer);
+    buffer.put_slice(head.bytes());
+    put_length(CHILD, child.len(), buffer);
+    buffer.put_slice(child.as_bytes());
     // In the order of the fields x, y, z and x, y, z, w.
     put_doubles(TRANSLATION, child_in_world.translation.vector.as_slice(), buffer);
     put_doubles(ROTATION, child_in_world.rotation.coords.as_slice(), buffer);
 }
 
-fn put_key(field: u32, wire_type: WireType, buffer: &mut Vec<u8>) {
-    buffer.put_u8((field << 3) as u8 | wire_type as u8);
+/// Bytes of translation and rotation: a double and its key each, key and length before them.
+const POSE_BYTES: usize = (2 + 3 * 9) + (2 + 4 * 9);
+
+/// The fields that all transforms of a message share: timestamp and parent.
+struct Head {
+    bytes: [u8; 32],
+    len: usize,
+}
+
+impl Head {
+    fn new(log_time_nanos: u64) -> Self {
+        let (seconds, nanos) = (log_time_nanos / 1_000_000_000, log_time_nanos % 1_000_000_000);
+        let stamp_len = 2 + encoded_len_varint(seconds) + encoded_len_varint(nanos);
+        let mut bytes = [0; 32];
+        let mut rest = bytes.as_mut_slice();
+        rest.put_slice(&[key(TIMESTAMP, WireType::LengthDelimited), stamp_len as u8]);
+        for (field, number) in [(1, seconds), (2, nanos)] {
+            rest.put_u8(key(field, WireType::Varint));
+            encode_varint(number, &mut rest);
+        }
+        rest.put_slice(&[key(PARENT, WireType::LengthDelimited), WORLD.len() as u8]);
+        rest.put_slice(WORLD.as_bytes());
+        let len = 32 - rest.len();
+        Self { bytes, len }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.len]
+    }
+}
+
+fn key(field: u32, wire_type: WireType) -> u8 {
+    (field << 3) as u8 | wire_type as u8
 }
 
 fn put_length(field: u32, length: usize, buffer: &mut Vec<u8>) {
-    put_key(field, WireType::LengthDelimited, buffer);
+    buffer.put_u8(key(field, WireType::LengthDelimited));
     encode_varint(length as u64, buffer);
 }
 
 fn put_doubles(field: u32, numbers: &[f32], buffer: &mut Vec<u8>) {
     put_length(field, 9 * numbers.len(), buffer);
     for (number, field) in numbers.iter().zip(1..) {
-        put_key(field, WireType::SixtyFourBit, buffer);
+        buffer.put_u8(key(field, WireType::SixtyFourBit));
         buffer.put_f64_le(f64::from(*number));
     }
 }
 
 /// Gives each transform of a `FrameTransforms` to `each`: the child's frame id and its pose in the world.
 pub(super) fn decode(
+    log_time_nanos: u64,
     mut message: &[u8],
     mut each: impl FnMut(&[u8], Pose) -> Result<(), MessageProblem>,
 ) -> Result<(), MessageProblem> {
+    let head = Head::new(log_time_nanos);
     while !message.is_empty() {
-        match decode_key(&mut message)? {
+        match wire::key(&mut message)? {
             (TRANSFORMS, WireType::LengthDelimited) => {
-                let (child, pose) = decode_transform(take(&mut message)?)?;
-                each(child, pose)?;
+                let transform = wire::content(&mut message)?;
+                let parts = split_ours(&head, transform).map_or_else(|| split_any(transform), Ok)?;
+                each(parts.child, parts.pose()?)?;
             }
-            (field, wire_type) => skip_field(wire_type, field, &mut message, DecodeContext::default())?,
+            (field, wire_type) => wire::skip(field, wire_type, &mut message)?,
         }
     }
     Ok(())
 }
 
-fn decode_transform(mut message: &[u8]) -> Result<(&[u8], Pose), MessageProblem> {
-    let mut child: &[u8] = &[];
-    let mut translation = [0.0; 3];
-    let mut rotation = [0.0; 4];
-    while !message.is_empty() {
-        match decode_key(&mut message)? {
+/// A transform taken apart.
+#[derive(Default)]
+struct Parts<'a> {
+    child: &'a [u8],
+    translation: [f64; 3],
+    rotation: [f64; 4],
+}
+
+impl Parts<'_> {
+    fn pose(&self) -> Result<Pose, MessageProblem> {
+        let [x, y, z, w] = self.rotation.map(|number| number as f32);
+        // The stored bits are the state: they must not be normalised again.
+        let rotation = Rotation::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
+        if (rotation.norm_squared() - 1.0).abs() < UNIT_TOLERANCE {
+            let translation = Vec3::from(self.translation.map(|number| number as f32));
+            Ok(Pose::from_parts(translation.into(), rotation))
+        } else {
+            Err(MessageProblem::NotUnit { frame: text(self.child) })
+        }
+    }
+}
+
+/// A transform as [`encode`] lays it out; `None` when it is laid out otherwise.
+fn split_ours<'a>(head: &Head, transform: &'a [u8]) -> Option<Parts<'a>> {
+    let rest = transform.strip_prefix(head.bytes())?;
+    let (child, pose) = rest.split_last_chunk::<POSE_BYTES>()?;
+    let child = match child {
+        [CHILD_KEY, length, child @ ..] if *length < 0x80 && usize::from(*length) == child.len() => child,
+        _ => return None,
+    };
+    let (translation, rotation) = pose.split_at(2 + 3 * 9);
+    Some(Parts {
+        child,
+        translation: split_doubles(TRANSLATION, translation)?,
+        rotation: split_doubles(ROTATION, rotation)?,
+    })
+}
+
+const CHILD_KEY: u8 = (CHILD << 3) as u8 | WireType::LengthDelimited as u8;
+
+fn split_doubles<const N: usize>(field: u32, message: &[u8]) -> Option<[f64; N]> {
+    let doubles = message.strip_prefix(&[key(field, WireType::LengthDelimited), 9 * N as u8])?;
+    let (doubles, _) = doubles.as_chunks::<9>();
+    let mut numbers = [0.0; N];
+    for ((number, [found, bytes @ ..]), field) in numbers.iter_mut().zip(doubles).zip(1..) {
+        if *found != key(field, WireType::SixtyFourBit) {
+            return None;
+        }
+        *number = f64::from_le_bytes(*bytes);
+    }
+    Some(numbers)
+}
+
+/// A transform with its fields in any order.
+fn split_any(mut transform: &[u8]) -> Result<Parts<'_>, MessageProblem> {
+    let mut parts = Parts::default();
+    while !transform.is_empty() {
+        match wire::key(&mut transform)? {
             (PARENT, WireType::LengthDelimited) => {
-                let parent = take(&mut message)?;
+                let parent = wire::content(&mut transform)?;
                 if parent != WORLD.as_bytes() {
                     return Err(MessageProblem::UnknownFrame { frame: text(parent) });
                 }
             }
-            (CHILD, WireType::LengthDelimited) => child = take(&mut message)?,
-            (TRANSLATION, WireType::LengthDelimited) => decode_doubles(take(&mut message)?, &mut translation)?,
-            (ROTATION, WireType::LengthDelimited) => decode_doubles(take(&mut message)?, &mut rotation)?,
-            (field, wire_type) => skip_field(wire_type, field, &mut message, DecodeContext::default())?,
+            (CHILD, WireType::LengthDelimited) => parts.child = wire::content(&mut transform)?,
+            (TRANSLATION, WireType::LengthDelimited) => {
+                decode_doubles(wire::content(&mut transform)?, &mut parts.translation)?;
+            }
+            (ROTATION, WireType::LengthDelimited) => {
+                decode_doubles(wire::content(&mut transform)?, &mut parts.rotation)?;
+            }
+            (field, wire_type) => wire::skip(field, wire_type, &mut transform)?,
         }
     }
-    let [x, y, z, w] = rotation;
-    // The stored bits are the state: they must not be normalised again.
-    let rotation = Rotation::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
-    if (rotation.norm_squared() - 1.0).abs() < UNIT_TOLERANCE {
-        Ok((child, Pose::from_parts(Vec3::from(translation).into(), rotation)))
-    } else {
-        Err(MessageProblem::NotUnit { frame: text(child) })
-    }
+    Ok(parts)
 }
 
-fn decode_doubles(mut message: &[u8], numbers: &mut [f32]) -> Result<(), MessageProblem> {
-    // As written here, all of them are there in their order.
-    let (parts, rest) = message.as_chunks::<9>();
-    let is_ours = |(part, field): (&[u8; 9], u8)| part[0] == (field << 3) | WireType::SixtyFourBit as u8;
-    if rest.is_empty() && parts.len() == numbers.len() && parts.iter().zip(1..).all(is_ours) {
-        for (number, [_key, bytes @ ..]) in numbers.iter_mut().zip(parts) {
-            *number = f64::from_le_bytes(*bytes) as f32;
-        }
-        return Ok(());
-    }
+fn decode_doubles(mut message: &[u8], numbers: &mut [f64]) -> Result<(), MessageProblem> {
     while !message.is_empty() {
-        let (field, wire_type) = decode_key(&mut message)?;
+        let (field, wire_type) = wire::key(&mut message)?;
         match (numbers.get_mut(field as usize - 1), wire_type) {
-            (Some(number), WireType::SixtyFourBit) => {
-                *number = message.try_get_f64_le().map_err(|_| MessageProblem::CutOff)? as f32;
-            }
-            _ => skip_field(wire_type, field, &mut message, DecodeContext::default())?,
+            (Some(number), WireType::SixtyFourBit) => *number = f64::from_le_bytes(wire::bytes(&mut message)?),
+            _ => wire::skip(field, wire_type, &mut message)?,
         }
     }
     Ok(())
-}
-
-/// The content of a length-delimited field, off the front of a message.
-fn take<'a>(message: &mut &'a [u8]) -> Result<&'a [u8], MessageProblem> {
-    let length = usize::try_from(decode_varint(message)?).map_err(|_| MessageProblem::CutOff)?;
-    let (field, rest) = message.split_at_checked(length).ok_or(MessageProblem::CutOff)?;
-    *message = rest;
-    Ok(field)
 }
 
 /// A frame id for an error message.
@@ -174,13 +229,18 @@ mod tests {
         assert_eq!((stamp.seconds, stamp.nanos), (3, 7));
         assert_eq!(first.translation.unwrap().y, f64::from(0.2_f32));
         assert_eq!(first.rotation.unwrap().w, f64::from(pose(0.0, 0.0, 0.0).rotation.w));
-        let mut again = Vec::new();
-        decode(&message.encode_to_vec(), |child, pose| {
-            encode(3_000_000_007, std::str::from_utf8(child).unwrap(), &pose, &mut again);
-            Ok(())
-        })
-        .unwrap();
-        assert_eq!(again, buffer);
+        // The last one leaves out what is zero, and at another time none is as it would be laid out here.
+        for (message, log_time_nanos) in
+            [(&message.encode_to_vec(), 3_000_000_007), (&buffer, 3_000_000_007), (&buffer, 8)]
+        {
+            let mut again = Vec::new();
+            decode(log_time_nanos, message, |child, pose| {
+                encode(3_000_000_007, std::str::from_utf8(child).unwrap(), &pose, &mut again);
+                Ok(())
+            })
+            .unwrap();
+            assert_eq!(again, buffer);
+        }
     }
 
     #[test]
@@ -192,7 +252,7 @@ mod tests {
         let mut buffer = Vec::new();
         encode(0, "a", &written, &mut buffer);
         let mut found = Vec::new();
-        decode(&buffer, |_, pose| {
+        decode(0, &buffer, |_, pose| {
             found.extend(
                 pose.translation.vector.iter().chain(pose.rotation.coords.iter()).map(|number| number.to_bits()),
             );

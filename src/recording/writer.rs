@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Metadata};
+use mcap::records::{MessageHeader, Metadata, op};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
 
@@ -21,7 +21,7 @@ use super::calls::{self, Step};
 use super::container::{MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{EpisodeProblem, RecordingError};
 use super::schema::{SCHEMA_VERSION, Topic, proto};
-use super::{start, transform, viewer};
+use super::{observation, start, transform, viewer};
 use crate::artifact::{AtomicFile, IoError};
 use crate::geometry::Pose;
 use crate::program::{Program, vocabulary_hash};
@@ -34,6 +34,7 @@ const GAP_NANOS: u64 = 1_000_000_000;
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Fixed, because the library's default may change between versions.
 const ZSTD_LEVEL: u32 = 3;
+const HALF_RECORD_BYTES: usize = MAX_RECORD_BYTES / 2;
 /// Name of the metadata record.
 pub(super) const METADATA: &str = "ntp.recording";
 /// Name of the attachment that holds the stage's plan.
@@ -237,7 +238,7 @@ impl Sink {
         let written = self.put_bytes(Topic::Transforms, log_time_nanos, &buffer);
         self.buffer = buffer;
         written?;
-        self.put(Topic::Observation, log_time_nanos, &encode_observation(position, frame))
+        self.put(Topic::Observation, log_time_nanos, &observation::encode(position, frame))
     }
 
     fn step(
@@ -274,9 +275,7 @@ impl Sink {
     }
 
     fn put_bytes(&mut self, topic: Topic, log_time_nanos: u64, message: &[u8]) -> Result<(), McapError> {
-        if message.len() > MAX_RECORD_BYTES / 2 {
-            return Err(McapError::RecordTooLarge { opcode: mcap::records::op::MESSAGE, len: message.len() as u64 });
-        }
+        check_size(op::MESSAGE, message)?;
         let sequence = &mut self.sequences[topic as usize];
         let header = MessageHeader {
             channel_id: channel_id(topic),
@@ -289,6 +288,7 @@ impl Sink {
     }
 
     fn close(mut self, plan_json: &str) -> Result<AtomicFile, McapError> {
+        check_size(op::ATTACHMENT, plan_json.as_bytes())?;
         self.mcap.attach(&Attachment {
             log_time: 0,
             create_time: 0,
@@ -298,6 +298,14 @@ impl Sink {
         })?;
         self.mcap.finish()?;
         Ok(self.mcap.into_inner())
+    }
+}
+
+/// What a reader would refuse is not written. Half of its limit leaves room for the rest of a record and of a chunk.
+fn check_size(opcode: u8, content: &[u8]) -> Result<(), McapError> {
+    match content.len() {
+        0..=HALF_RECORD_BYTES => Ok(()),
+        len => Err(McapError::RecordTooLarge { opcode, len: len as u64 }),
     }
 }
 
@@ -332,19 +340,6 @@ fn bits(pose: &Pose) -> [u32; 7] {
     let [x, y, z] = pose.translation.vector.into();
     let [i, j, k, w] = pose.rotation.coords.into();
     [x, y, z, i, j, k, w].map(f32::to_bits)
-}
-
-fn encode_observation(position: u32, frame: &Frame) -> proto::Observation {
-    let Frame { time_nanos: _, boundary, state, slots } = frame;
-    let slot_positions_m = if *boundary { frame.observation().slots_m.into_flattened() } else { Vec::new() };
-    proto::Observation {
-        frame: position,
-        boundary: *boundary,
-        opening_m: state.opening_m,
-        held: state.held.map(|body| u32::from(body.0)),
-        slots: slots.iter().map(|body| u32::from(body.0)).collect(),
-        slot_positions_m,
-    }
 }
 
 fn encode_end(episode: &Episode) -> proto::EpisodeEnd {

@@ -4,9 +4,10 @@
 //! camera and names its parts at random.
 
 use rerun::blueprint::components::{
-    ContainerKind, Corner2D, IncludedContent, LinkAxis, LoopMode, PanelState, PlayState, QueryExpression,
+    ContainerKind, Corner2D, IncludedContent, LoopMode, PanelState, PlayState, QueryExpression,
 };
 use rerun::components::{Position3D, Vector3D};
+use rerun::datatypes::TimeRangeBoundary;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns,
     TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
@@ -128,7 +129,9 @@ fn put_plot(layout: &mut Layout, name: &str, origin: &str, range: Option<[f64; 2
     let view = layout.view("TimeSeries", name, origin, &[&format!("/{origin}/**")])?;
     let legend = PlotLegend::new().with_corner(Corner2D::RightTop).with_visible(range.is_some());
     layout.put_property(view, "PlotLegend", &legend)?;
-    layout.put_property(view, "TimeAxis", &TimeAxis::new().with_link(LinkAxis::LinkToGlobal))?;
+    // Rerun would show half a minute to both sides of the cursor.
+    let whole = datatypes::TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::Infinite };
+    layout.put_property(view, "TimeAxis", &TimeAxis::new().with_view_range(whole))?;
     if let Some(range) = range {
         layout.put_property(view, "ScalarAxis", &ScalarAxis::new().with_range(range))?;
     }

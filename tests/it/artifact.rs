@@ -36,11 +36,11 @@ fn a_stage_is_finished_only_when_every_shard_has_its_receipt() {
     for shard in [2, 0] {
         dir.commit_shard(&receipt(&dir, &plan, shard)).unwrap();
     }
-    let error = dir.commit(&plan).unwrap_err();
+    let error = dir.commit(&plan, &[]).unwrap_err();
     assert!(matches!(&error, ContractError::MissingShards { missing, total: 3, .. } if *missing == [1]));
     assert!(matches!(dir.finished().unwrap_err(), ContractError::Unfinished { .. }));
     dir.commit_shard(&receipt(&dir, &plan, 1)).unwrap();
-    let manifest = dir.commit(&plan).unwrap();
+    let manifest = dir.commit(&plan, &[]).unwrap();
     assert_eq!((manifest.episodes, manifest.failed, manifest.files.len()), (6, 3, 3));
 }
 
@@ -63,7 +63,7 @@ fn a_changed_file_is_named_with_what_its_manifest_says() {
     let plan = plan(1, 1);
     dir.begin(&plan).unwrap();
     dir.commit_shard(&receipt(&dir, &plan, 0)).unwrap();
-    let manifest = dir.commit(&plan).unwrap();
+    let manifest = dir.commit(&plan, &[]).unwrap();
     dir.check_files(&manifest, true).unwrap();
     write(&dir.path().join("shard-0"), &[9; 10]).unwrap();
     dir.check_files(&manifest, false).unwrap();

@@ -121,6 +121,30 @@ fn shards_done_one_by_one_are_committed_by_the_stage() {
 }
 
 #[test]
+fn a_shard_that_does_not_exist_is_refused_with_those_that_do() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &["--to", "tasks"]).0, 0);
+    let out = folder.path().to_string_lossy();
+    let (code, _, stderr) = run(&["generate", "pipelines/smoke.toml", "--out", out.as_ref(), "--shard", "3"]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("generate has shards 0 to 2"), "{stderr}");
+}
+
+#[test]
+fn a_model_of_another_family_is_refused_with_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run_smoke(folder.path(), &["--to", "train"]).0, 0);
+    let config = folder.path().join("models/ntp-seed0/config.json");
+    let text = std::fs::read_to_string(&config).unwrap();
+    let other = text.replace("block_stacking", "object_sorting");
+    assert!(other.len() == text.len() && other != text);
+    std::fs::write(&config, other).unwrap();
+    let (code, _, stderr) = run_smoke(folder.path(), &[]);
+    assert_eq!(code, 1);
+    assert!(stderr.contains("config.json") && stderr.contains("object_sorting"), "{stderr}");
+}
+
+#[test]
 fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(run_smoke(folder.path(), &[]).0, 0);
