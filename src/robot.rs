@@ -7,7 +7,7 @@
 
 use crate::program::Program;
 use crate::scene::{Scene, SceneState, SlotIndex};
-use crate::trace::{Cause, Frame};
+use crate::trace::{Cause, Frame, Push};
 
 /// A call of the robot API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -59,6 +59,11 @@ pub trait RobotApi {
     ///
     /// What went wrong in this action. The world goes on: a reactive policy may still recover.
     fn act(&mut self, action: Action) -> Result<(), Cause>;
+
+    /// The pushes from outside so far, in order; `None` in a world without an adversary.
+    fn pushes(&self) -> Option<&[Push]> {
+        None
+    }
 
     /// Lets the world come to rest without recording, to judge the outcome: the state at rest.
     fn settle(&mut self) -> SceneState;

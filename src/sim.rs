@@ -13,9 +13,11 @@
 //! # Invariants
 //!
 //! The same scene, start, settings and actions give the same bits, in any thread and for any number of threads. There
-//! is no randomness here and no clock but counted steps. Each action ends with exactly one boundary frame.
+//! is no randomness here but an adversary's, which comes from its seed, and no clock but counted steps. Each action ends
+//! with exactly one boundary frame.
 
 mod act;
+mod adversary;
 mod check;
 mod clock;
 mod config;
@@ -29,15 +31,17 @@ mod sweep;
 mod watch;
 mod world;
 
+pub use adversary::AdversaryConfig;
 pub use config::SimulationConfig;
 pub use error::SimError;
 
 use crate::geometry::yaw_rad;
 use crate::robot::{Action, RobotApi};
 use crate::scene::{BodyIndex, Scene, SceneState, locked_bodies};
-use crate::trace::{Cause, Frame};
+use crate::trace::{Cause, Frame, Push};
 
 use act::Air;
+use adversary::Adversary;
 use clock::Clock;
 use engine_shape::{IntoEngine as _, from_engine};
 use gripper::Gripper;
@@ -49,9 +53,6 @@ use world::World;
 const PATIENCE_SECS: u32 = 1;
 
 /// A tabletop world with a gripper in it.
-///
-/// A push from outside between two actions belongs here, beside [`RobotApi`]: an impulse on a body of the engine
-/// wakes it, and the engine is stepped until it sleeps again.
 pub struct Simulation {
     scene: Scene,
     config: SimulationConfig,
@@ -64,6 +65,7 @@ pub struct Simulation {
     lift_off_z: Option<f32>,
     /// Lost on the way in this action.
     dropped: Option<BodyIndex>,
+    adversary: Option<Adversary>,
 }
 
 impl Simulation {
@@ -95,6 +97,7 @@ impl Simulation {
             frames: Vec::new(),
             lift_off_z: None,
             dropped: None,
+            adversary: None,
         };
         simulation.come_to_rest();
         simulation.clock = clock;
@@ -158,6 +161,14 @@ impl Simulation {
         is_quiet
     }
 
+    /// What this action did to the bodies that it should have left alone; `held_before` was in the grasp at its start.
+    fn judge(&mut self, held_before: Option<BodyIndex>) -> Option<Cause> {
+        let state = self.state();
+        let handled: Vec<BodyIndex> = held_before.into_iter().chain(state.held).collect();
+        let Self { scene, world, watch, .. } = self;
+        watch.judge(scene, &state, &handled, |body| !world.body(body).is_sleeping())
+    }
+
     /// Appends a frame. A frame between boundaries that is due at the very end of an action is the boundary.
     fn record(&mut self, boundary: bool) {
         let time_nanos = self.clock.time_nanos();
@@ -203,15 +214,19 @@ impl RobotApi for Simulation {
         if self.clock.time_nanos() == before_nanos {
             self.tick(self.gripper.tool, Air::Clear);
         }
+        let broken = self.judge(held_before);
+        let released = held_before.filter(|_| action == Action::Release && self.gripper.held.is_none());
+        let pushed = released.and_then(|body| self.disturb(body));
         self.record(true);
-        let held_after = self.gripper.held.map(|held| held.body);
-        let handled: Vec<BodyIndex> = held_before.into_iter().chain(held_after).collect();
-        let Self { scene, world, watch, frames, .. } = self;
-        let state = frames.last().map(|frame| &frame.state);
-        let is_moving = |body| !world.body(body).is_sleeping();
-        let broken = state.and_then(|state| watch.judge(scene, state, &handled, is_moving));
+        let pushed_off = pushed.as_ref().is_some_and(|pushed| pushed.fell_off).then_some(Cause::PushedOffTable);
+        pushed.into_iter().for_each(|pushed| self.tell(pushed));
         let dropped = self.dropped.map(|_| Cause::DroppedObject);
-        gravest(broken, gravest(dropped, performed.err())).map_or(Ok(()), Err)
+        let own = gravest(broken, gravest(dropped, performed.err()));
+        gravest(own, pushed_off).map_or(Ok(()), Err)
+    }
+
+    fn pushes(&self) -> Option<&[Push]> {
+        self.adversary.as_ref().map(|adversary| adversary.pushes.as_slice())
     }
 
     fn settle(&mut self) -> SceneState {

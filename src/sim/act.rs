@@ -85,8 +85,7 @@ impl Simulation {
             self.close_on_air();
             return self.miss();
         };
-        let yaw_rad =
-            grasp::yaw_rad(&self.scene.body(body).shape, &self.world.in_world(body), self.gripper.tool.yaw_rad);
+        let yaw_rad = self.grasp_yaw_rad(body);
         self.follow(Tool { yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
         self.sink(self.world.in_world(body).translation.z + GRASP_M, 0.0);
         if !self.close_on(body) || !grasp::is_between_fingers(&self.gripper.tool, &self.world.in_world(body)) {
@@ -95,6 +94,19 @@ impl Simulation {
         self.gripper.hold(&mut self.world, body);
         self.lift_off_z = Some(self.gripper.tool.position.z + LIFT_OFF_M);
         Ok(())
+    }
+
+    /// The turn with which the open fingers can go down beside a body; the nearest when they never can.
+    fn grasp_yaw_rad(&self, body: BodyIndex) -> f32 {
+        let tool = self.gripper.tool;
+        let in_world = self.world.in_world(body);
+        let yaws = grasp::yaws_rad(&self.scene.body(body).shape, &in_world, tool.yaw_rad);
+        let down = Vector::new(0.0, 0.0, (in_world.translation.z + GRASP_M - tool.position.z).min(0.0));
+        let is_free = |yaw_rad: &&f32| {
+            let turned = Tool { yaw_rad: **yaw_rad, ..tool };
+            self.gripper.free_way_m(&self.world, &turned, down, AtStart::Stops) >= down.length()
+        };
+        yaws.iter().find(is_free).or(yaws.first()).copied().unwrap_or(tool.yaw_rad)
     }
 
     fn miss(&mut self) -> Result<(), Cause> {
@@ -130,7 +142,7 @@ impl Simulation {
     }
 
     /// Steps until all is at rest.
-    fn rest(&mut self) -> Result<(), Cause> {
+    pub(super) fn rest(&mut self) -> Result<(), Cause> {
         for step in 0..self.config.settle_limit_steps() {
             self.tick(self.gripper.tool, Air::Unknown);
             if self.is_at_rest(step) {
@@ -170,7 +182,7 @@ impl Simulation {
     }
 
     /// Straight up to a height; not at all when it is higher already.
-    fn rise(&mut self, z: f32) {
+    pub(super) fn rise(&mut self, z: f32) {
         let tool = self.gripper.tool;
         let way = Vector::new(0.0, 0.0, z - tool.position.z);
         if way.z <= 0.0 {

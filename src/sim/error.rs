@@ -6,6 +6,8 @@
 pub enum SimError {
     #[error("simulation.{key} is {found}; allowed: {allowed}")]
     Config { key: &'static str, found: String, allowed: String },
+    #[error("adversary.{key} is {found}; allowed: {allowed}")]
+    Adversary { key: &'static str, found: f32, allowed: &'static str },
     #[error("{found} body poses, but the scene has {expected} bodies")]
     BodyCount { found: usize, expected: usize },
     #[error("{name}: every size must be a finite number above 0")]

@@ -18,17 +18,20 @@ const EQUAL_M: f32 = 0.001;
 /// How far from the fingers' middle a body's centre may be, along their flat sides and in height, in metres.
 const MAX_OFFSET_M: f32 = 0.015;
 
-/// The yaw with which the fingers, which close along the gripper's y, meet a body's nearest parallel sides: across
-/// its shorter side, and of equal sides the one that is nearest to the present yaw.
-pub(super) fn yaw_rad(shape: &Shape, in_world: &EnginePose, now_rad: f32) -> f32 {
+/// The yaws with which the fingers, which close along the gripper's y, meet a body's nearest parallel sides: across its
+/// shorter side, and of equal sides the one that is nearest to the present yaw first. The present one alone where no
+/// turn is needed or helps.
+pub(super) fn yaws_rad(shape: &Shape, in_world: &EnginePose, now_rad: f32) -> Vec<f32> {
     let sides = sides(shape, in_world);
     let fits = sides.iter().filter(|side| 2.0 * side.half_m + FINGER_ROOM_M <= MAX_OPENING_M);
     let shortest_m = fits.clone().map(|side| side.half_m).fold(f32::MAX, f32::min);
-    let turn = fits
+    let mut turns: Vec<f32> = fits
         .filter(|side| side.half_m <= shortest_m + EQUAL_M)
         .map(|side| half_turn_rad(now_rad, side.across.y.atan2(side.across.x) - FRAC_PI_2))
-        .min_by(|a, b| a.abs().total_cmp(&b.abs()));
-    turn.filter(|turn| turn.abs() >= MIN_TURN_RAD).map_or(now_rad, |turn| now_rad + turn)
+        .collect();
+    turns.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let yaw = |turn: &f32| if turn.abs() >= MIN_TURN_RAD { now_rad + turn } else { now_rad };
+    if turns.is_empty() { vec![now_rad] } else { turns.iter().map(yaw).collect() }
 }
 
 /// A pair of parallel upright sides.
@@ -88,7 +91,7 @@ mod tests {
 
     #[track_caller]
     fn check(half_extents_m: [f32; 3], body_yaw_rad: f32, expected_rad: f32) {
-        let found = yaw_rad(&Shape::Cuboid { half_extents_m }, &turned(body_yaw_rad), 0.0);
+        let found = yaws_rad(&Shape::Cuboid { half_extents_m }, &turned(body_yaw_rad), 0.0)[0];
         // The two fingers are alike: half a turn is no difference.
         let difference = (found - expected_rad).rem_euclid(PI);
         assert!(difference.min(PI - difference) < 1e-3, "{found} instead of {expected_rad}");

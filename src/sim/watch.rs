@@ -36,6 +36,18 @@ impl Watch {
         Self { bodies: state.bodies_in_world.iter().map(watched).collect() }
     }
 
+    /// Takes where everything is now for where it was left; whether a body has fallen off the table since it was last
+    /// judged.
+    pub(super) fn forgive(&mut self, scene: &Scene, state: &SceneState) -> bool {
+        let mut lost = false;
+        for (watched, body) in self.bodies.iter_mut().zip(scene.body_indices()) {
+            let place = place(scene, state, body);
+            lost |= watched.place == Place::OnTable && place == Place::OffTable;
+            *watched = Watched { position: state.body_in_world(body).translation.vector.into_engine(), place };
+        }
+        lost
+    }
+
     /// Judges an action by the state after it; `handled` were in the grasp at its start or its end, and `is_moving`
     /// tells the bodies that still move: they are judged when they rest.
     pub(super) fn judge(
@@ -51,8 +63,7 @@ impl Watch {
             let watched = &mut self.bodies[usize::from(body.0)];
             let before = *watched;
             let position = state.body_in_world(body).translation.vector.into_engine();
-            let on_table = is_on_table(scene, state.body_in_world(body)) || state.held == Some(body);
-            watched.place = if on_table { Place::OnTable } else { Place::OffTable };
+            watched.place = place(scene, state, body);
             let knocked = (position - before.position).length() > KNOCKED_M
                 && !handled.contains(&body)
                 && !lies_in_any_container(scene, state, body);
@@ -69,14 +80,20 @@ impl Watch {
     }
 }
 
+fn place(scene: &Scene, state: &SceneState, body: BodyIndex) -> Place {
+    let on_table = is_on_table(scene, state.body_in_world(body)) || state.held == Some(body);
+    if on_table { Place::OnTable } else { Place::OffTable }
+}
+
 /// The graver of two causes: what was lost or broken comes before what merely did not work.
 pub(super) fn gravest(first: Option<Cause>, second: Option<Cause>) -> Option<Cause> {
     let gravity = |cause: &Cause| match cause {
         Cause::ObjectOffTable => 0,
-        Cause::KnockedTower => 1,
-        Cause::DroppedObject => 2,
-        Cause::MissedGrasp => 3,
-        Cause::TimeLimit | Cause::EndedEarly | Cause::NeverEnded => 4,
+        Cause::PushedOffTable => 1,
+        Cause::KnockedTower => 2,
+        Cause::DroppedObject => 3,
+        Cause::MissedGrasp => 4,
+        Cause::TimeLimit | Cause::EndedEarly | Cause::NeverEnded => 5,
     };
     first.into_iter().chain(second).min_by_key(gravity)
 }

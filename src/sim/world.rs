@@ -132,6 +132,12 @@ impl World {
         }
     }
 
+    /// Pushes a body at its centre of mass, in newton seconds.
+    pub(super) fn push(&mut self, index: BodyIndex, impulse_ns: Vector) {
+        let handle = self.handle(index);
+        self.engine.bodies[handle].apply_impulse(impulse_ns, true);
+    }
+
     /// Length of a step.
     pub(super) fn step_secs(&self) -> f32 {
         self.engine.integration_parameters.dt

@@ -23,6 +23,8 @@ pub enum Cause {
     KnockedTower,
     /// A body left the table.
     ObjectOffTable,
+    /// An adversary pushed a body off the table.
+    PushedOffTable,
     /// The held body was lost on the way.
     DroppedObject,
     /// A motion did not come to its end in time.
@@ -35,10 +37,11 @@ pub enum Cause {
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::MissedGrasp,
         Self::KnockedTower,
         Self::ObjectOffTable,
+        Self::PushedOffTable,
         Self::DroppedObject,
         Self::TimeLimit,
         Self::EndedEarly,
@@ -51,6 +54,7 @@ impl Cause {
             Self::MissedGrasp => "missed_grasp",
             Self::KnockedTower => "knocked_tower",
             Self::ObjectOffTable => "object_off_table",
+            Self::PushedOffTable => "pushed_off_table",
             Self::DroppedObject => "dropped_object",
             Self::TimeLimit => "time_limit",
             Self::EndedEarly => "ended_early",
