@@ -10,11 +10,12 @@ mod file;
 mod goal;
 mod import;
 mod layout;
+mod order;
 mod sampler;
 mod set;
 
 pub use file::TaskFileError;
-pub use goal::{Condition, Goal, condition_holds, goal_holds};
+pub use goal::{Condition, Goal, condition_holds, goal_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
 pub use layout::{MAX_INSTANCES, Trial, initial_state, scene};
 pub use sampler::{SampleError, sample};

@@ -397,3 +397,21 @@ fn every_seed_has_a_start_with_room_for_fingers() {
         }
     }
 }
+
+#[test]
+fn shuffled_towers_end_in_the_same_configuration_by_another_lawful_order() {
+    let set = sample(Family::BlockStacking, 200, 0, Seed(4)).unwrap();
+    let mut n_single = 0;
+    for task in &set.tasks {
+        let Some(shuffled) = task.with_towers_shuffled(Seed(9)) else {
+            n_single += 1;
+            assert_eq!(heights(&task.goals).len(), 1, "{}", task.id);
+            continue;
+        };
+        assert_ne!(shuffled.goals, task.goals, "{}", task.id);
+        assert_eq!(shuffled.canonical_goal(), task.canonical_goal());
+        assert_eq!(shuffled.with_towers_shuffled(Seed(1)).map(|again| again.goals.len()), Some(task.goals.len()));
+        TaskSet { family: set.family, tasks: vec![shuffled] }.validate().unwrap();
+    }
+    assert!(n_single < 20, "{n_single} of 200 tasks are of one tower");
+}
