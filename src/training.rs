@@ -22,6 +22,7 @@ mod curriculum;
 mod examples;
 mod learner;
 mod metrics;
+mod recovery;
 
 pub use batch::{Part, draw};
 pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};

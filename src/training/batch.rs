@@ -10,10 +10,12 @@ use rand::Rng;
 use crate::model::Windows;
 use crate::program::Program;
 use crate::seed::Seed;
+use crate::task::Family;
 use crate::trace::{Observation, ScopingLabel};
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
+use crate::training::recovery;
 
 /// Frames in a mini-batch from which on it is split in two parts of about the same length of windows: less padding,
 /// and a part for each of two cores. A fixed number, since the sum of gradients must not depend on the machine.
@@ -53,10 +55,11 @@ struct Prepared {
 /// Draws a mini-batch of a level. It depends on nothing but its arguments.
 pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, size: usize, seed: Seed) -> Vec<Part> {
     let mut rng = seed.rng();
+    let is_root = examples.levels().nth(level_idx).is_some_and(|(_, is_root)| is_root);
     let mut drawn: Vec<Prepared> = (0..size)
         .map(|_| {
             let example = examples.draw(level_idx, config.pairing, &mut rng);
-            prepare(examples, config, example, &mut rng)
+            prepare(examples, config, is_root, example, &mut rng)
         })
         .collect();
     drawn.sort_by_key(|prepared| prepared.example.window.len());
@@ -98,9 +101,16 @@ impl Counts {
     }
 }
 
-fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Prepared {
+fn prepare(
+    examples: &Examples<'_>,
+    config: &TrainConfig,
+    is_root: bool,
+    mut example: Example,
+    rng: &mut impl Rng,
+) -> Prepared {
     let data = examples.data();
     let width = Observation::width(data.n_slots);
+    let family = data.trials[example.trial].family;
     let rows = &data.trials[example.demonstration].observations;
     let mut views = Views {
         n_slots: data.n_slots,
@@ -108,7 +118,14 @@ fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng:
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
         argument: example.argument.map(|slot| usize::from(slot.0)),
     };
-    views.augment(data.trials[example.trial].family, config, &example, rng);
+    // One draw, whatever the settings: see `Views::augment`.
+    let mut recovery = Seed(rng.random()).rng();
+    let recovers = recovery.random::<f32>() < config.recovery_states.unwrap_or_default();
+    if recovers && is_root && family == Family::BlockStacking {
+        let sub_tasks = examples.sub_tasks(example.demonstration);
+        recovery::knock_over(&sub_tasks, &mut example, &mut views.state, &mut recovery);
+    }
+    views.augment(family, config, &example, rng);
     let Views { n_slots: _, window, state, argument } = views;
     Prepared { example, window, state, argument }
 }

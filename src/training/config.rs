@@ -22,14 +22,15 @@ impl Training {
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
-        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
-            Variant::Ntp => (0.003, 0.0, 0.2),
-            Variant::NtpPaper => (0.002, 1.0, 0.0),
+        let (learning_rate, relabel_slots, gripper_jitter, recovery_states) = match self.variant {
+            Variant::Ntp => (0.003, 0.0, 0.2, 0.25),
+            Variant::NtpPaper => (0.002, 1.0, 0.0, 0.0),
         };
         let config = TrainConfig {
             learning_rate: self.config.learning_rate.or(Some(learning_rate)),
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
             gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
+            recovery_states: self.config.recovery_states.or(Some(recovery_states)),
             ..self.config.clone()
         };
         Self { config, ..self.clone() }
@@ -68,6 +69,9 @@ pub struct TrainConfig {
     /// How often slots that the running program has nothing to do with are put elsewhere, in the demonstration and
     /// now (0 to 1): a program learns to look at its own slots alone. Off by default; Object Sorting needs it.
     pub scatter_bystanders: f32,
+    /// How often part of what was built lies on the table again, and the root program is to build it anew (0 to 1);
+    /// for families that build towers. By default 0.25 for object-centric networks and never for flattened ones.
+    pub recovery_states: Option<f32>,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -89,6 +93,7 @@ impl Default for TrainConfig {
             relabel_slots: None,
             gripper_jitter: None,
             scatter_bystanders: 0.0,
+            recovery_states: None,
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -157,6 +162,7 @@ impl TrainConfig {
             ("relabel_slots", self.relabel_slots.unwrap_or(0.0)),
             ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
             ("scatter_bystanders", self.scatter_bystanders),
+            ("recovery_states", self.recovery_states.unwrap_or(0.0)),
         ];
         let weights = [
             ("loss.program", loss.program),

@@ -20,6 +20,7 @@ use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::task::Split;
 use crate::trace::{Observation, ProgramCall, Span};
+use crate::training::recovery::{SubTask, position};
 use crate::training::{Pairing, TrainError};
 
 /// One decision of an expert.
@@ -172,6 +173,20 @@ impl<'d> Examples<'d> {
             involved: moves_below(calls, own_caller),
             last_decision: next.is_none(),
         })
+    }
+
+    /// The callees of a trial's root that bring one slot to another, in order.
+    pub(super) fn sub_tasks(&self, trial: usize) -> Vec<SubTask> {
+        let TrialData { calls, observations, .. } = &self.data.trials[trial];
+        let width = Observation::width(self.data.n_slots);
+        let sub_task = |(&call, moves): (&usize, &Vec<SlotIndex>)| {
+            let (&[source, target], Some(part)) = (moves.as_slice(), calls[call].output) else { return None };
+            let last = &observations[part.last() as usize * width..][..width];
+            let (upper, lower) = (position(last, source), position(last, target));
+            let offset_m = std::array::from_fn(|axis| upper[axis] - lower[axis]);
+            Some(SubTask { program: calls[call].program, source, target, part, offset_m })
+        };
+        self.trees[trial].signatures.iter().filter_map(sub_task).collect()
     }
 
     /// The call of `other` that does what a call of `trial` does.
