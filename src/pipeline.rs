@@ -31,7 +31,8 @@ pub use layout::RunDir;
 pub use resolve::Pipeline;
 pub use runner::{Options, StageReport, Status, run};
 pub use spec::{
-    CountsSpec, GenerateSpec, ModelSpec, PipelineSpec, RecordedFrames, ReportSpec, RolloutSpec, SuiteSpec, TasksSpec,
+    CountsSpec, GenerateSpec, ModelSpec, OrderSpec, PipelineSpec, RecordedFrames, ReportSpec, RolloutSpec, SuiteSpec,
+    TasksSpec,
 };
 pub use stage::Stage;
 pub use verify::{Verification, verify};

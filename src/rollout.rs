@@ -8,6 +8,7 @@
 //! [`Episode`]: crate::trace::Episode
 
 mod divergence;
+mod expectation;
 mod interpreter;
 mod learned;
 mod oracle;
@@ -15,6 +16,7 @@ mod policy;
 mod rows;
 
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
+pub use expectation::Expectation;
 pub use interpreter::{Limits, RolloutEpisode, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;

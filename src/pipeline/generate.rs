@@ -10,7 +10,8 @@ use crate::pipeline::trials::trial;
 use crate::pipeline::{PipelineError, RecordedFrames, Stage, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
-use crate::sim::{Simulation, SimulationConfig};
+use crate::seed::Seed;
+use crate::sim::{AdversaryConfig, SimError, Simulation, SimulationConfig};
 use crate::task::{self, Split, Task, Trial};
 use crate::trace::{Actor, Episode, Provenance};
 
@@ -110,4 +111,16 @@ pub(super) fn world(task: &Task, trial: &Trial, config: &SimulationConfig) -> Re
     let scene = task::scene(task.family, &trial.counts);
     let initial = task::initial_state(task.family, &scene, trial.seed);
     Ok(Simulation::new(scene, &initial, config)?)
+}
+
+/// The same world with an adversary in it, if there is to be one: its pushes depend on the trial's seed.
+pub(super) fn disturbed(
+    world: Simulation,
+    adversary: Option<AdversaryConfig>,
+    trial: Seed,
+) -> Result<Simulation, SimError> {
+    match adversary {
+        Some(config) => world.with_adversary(config, trial.derive("adversary", &[])),
+        None => Ok(world),
+    }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact;
 use crate::pipeline::trials::DEFAULT_COUNTS;
-use crate::pipeline::{CountsSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::pipeline::{CountsSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::task::{Family, MAX_INSTANCES, Split};
 
 /// A checked pipeline.
@@ -174,8 +174,25 @@ impl Pipeline {
         if suite.split == Split::Unseen && self.spec.tasks.import.is_none() && self.n_unseen() == 0 {
             return Err(self.value(&key("split"), "is unseen, but tasks.unseen is 0"));
         }
+        self.check_towers(&key, suite)?;
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)
+    }
+
+    /// What is said of towers is said of a family that builds some.
+    fn check_towers(&self, key: &impl Fn(&str) -> String, suite: &SuiteSpec) -> Result<(), PipelineError> {
+        if let Some(Err(problem)) = suite.adversary.map(|adversary| adversary.check()) {
+            return Err(self.value(&key("adversary"), problem.to_string()));
+        }
+        let family = self.spec.tasks.family;
+        let said = [("adversary", suite.adversary.is_some()), ("order", suite.order != OrderSpec::Own)];
+        match said.into_iter().find(|&(_, is_said)| is_said && family != Family::BlockStacking) {
+            Some((field, _)) => {
+                let problem = format!("{} builds no towers; allowed for block_stacking", family.name());
+                Err(self.value(&key(field), problem))
+            }
+            None => Ok(()),
+        }
     }
 }
 

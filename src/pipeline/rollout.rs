@@ -8,14 +8,15 @@ use serde_json::json;
 
 use crate::artifact::{FileEntry, Plan, Receipt};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
-use crate::pipeline::generate::{demonstrate, simulation_config, world};
+use crate::pipeline::generate::{demonstrate, disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
+use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::rollout::{self, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
+use crate::seed::Seed;
 use crate::task::{Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance};
 
@@ -91,7 +92,7 @@ struct Suite<'a> {
     context: &'a Context<'a>,
     unit: &'a Unit,
     spec: &'a SuiteSpec,
-    tasks: Vec<&'a Task>,
+    tasks: Vec<Task>,
     learned: Option<Learned>,
 }
 
@@ -138,17 +139,23 @@ impl Learned {
     }
 }
 
-fn suite_tasks<'t>(
-    context: &Context<'_>,
-    task_set: &'t TaskSet,
-    spec: &SuiteSpec,
-) -> Result<Vec<&'t Task>, PipelineError> {
-    let tasks: Vec<&Task> = task_set.of_split(spec.split).collect();
+/// The tasks of a suite's split, in the suite's order of sub-tasks.
+fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> Result<Vec<Task>, PipelineError> {
+    let seed = Seed(context.pipeline.spec.seed);
+    let ordered = |task: &Task| match spec.order {
+        OrderSpec::Own => Some(task.clone()),
+        OrderSpec::Shuffled => task.with_towers_shuffled(seed.derive(&format!("order/{}/{}", spec.name, task.id), &[])),
+    };
+    let tasks: Vec<Task> = task_set.of_split(spec.split).filter_map(ordered).collect();
     if tasks.is_empty() {
+        let (field, problem) = match spec.order {
+            OrderSpec::Own => ("split", format!("is {}, but there is no such task", spec.split)),
+            OrderSpec::Shuffled => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),
+        };
         return Err(PipelineError::Value {
             path: context.pipeline.path.clone(),
-            key: format!("rollout.suites.{}.split", spec.name),
-            problem: format!("is {}, but there is no such task", spec.split),
+            key: format!("rollout.suites.{}.{field}", spec.name),
+            problem,
         });
     }
     Ok(tasks)
@@ -202,7 +209,7 @@ impl Suite<'_> {
 
     fn start(&self, episode: u32) -> Result<Start<'_>, PipelineError> {
         let Self { context, spec, tasks, .. } = self;
-        let task = tasks[episode as usize % tasks.len()];
+        let task = &tasks[episode as usize % tasks.len()];
         let demonstration = self.demonstration(task, episode)?;
         let run_seed = context.pipeline.spec.seed;
         let mut own = trial(run_seed, &format!("rollout/{}", spec.name), task, episode, spec.on_table);
@@ -216,7 +223,8 @@ impl Suite<'_> {
         };
         let config = simulation_config(recorded, &context.pipeline.spec.generate.simulation);
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
-        Ok(Start { task, demonstration, world: Box::new(world(task, &own, &config)?), provenance })
+        let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
+        Ok(Start { task, demonstration, world: Box::new(world), provenance })
     }
 
     /// The expert's demonstration of a task, from initial positions that no training demonstration has.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::ConvertConfig;
 use crate::model::{Decoder, Variant};
-use crate::sim::SimulationConfig;
+use crate::sim::{AdversaryConfig, SimulationConfig};
 use crate::task::{Family, Split};
 use crate::training::TrainConfig;
 
@@ -162,6 +162,23 @@ pub struct SuiteSpec {
     /// Instances of each category on the table; as demonstrated when left out.
     #[serde(default)]
     pub on_table: Option<CountsSpec>,
+    /// In which order towers are demonstrated.
+    #[serde(default)]
+    pub order: OrderSpec,
+    /// Knocks towers over after placements; none when left out. For families that build towers.
+    #[serde(default)]
+    pub adversary: Option<AdversaryConfig>,
+}
+
+/// In which order the towers of a task are demonstrated. Within a tower it is always from below.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OrderSpec {
+    /// The task's own.
+    #[default]
+    Own,
+    /// Another: the same end by another way. Tasks of a single tower, which have no other, are left out.
+    Shuffled,
 }
 
 /// How results are shown.

@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use crate::artifact::Plan;
 use crate::pipeline::PipelineError;
+use crate::pipeline::generate::disturbed;
 use crate::robot::{Action, RobotApi as _};
-use crate::sim::{Simulation, SimulationConfig};
+use crate::sim::{AdversaryConfig, Simulation, SimulationConfig};
 use crate::task;
 use crate::trace::Episode;
 
@@ -62,7 +63,8 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
     let provenance = &episode.provenance;
     let scene = task::scene(provenance.family, &provenance.counts);
     let initial = task::initial_state(provenance.family, &scene, provenance.trial().seed);
-    let mut world = Simulation::new(scene, &initial, &config)?;
+    let world = Simulation::new(scene, &initial, &config)?;
+    let mut world = disturbed(world, recorded_adversary(plan), provenance.trial().seed)?;
     for call in episode.calls.iter() {
         if let Some(action) = Action::new(call.program, call.argument) {
             // What goes wrong in physics went wrong the first time too; the frames tell.
@@ -76,6 +78,11 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
 fn recorded_config(plan: &Plan) -> Option<SimulationConfig> {
     let config = plan.config.pointer("/generate/simulation").or_else(|| plan.config.get("simulation"))?;
     serde_json::from_value(config.clone()).ok()
+}
+
+/// Settings of a suite's adversary, if it had one.
+fn recorded_adversary(plan: &Plan) -> Option<AdversaryConfig> {
+    serde_json::from_value(plan.config.pointer("/suite/adversary")?.clone()).ok()
 }
 
 fn compare(episode: &Episode, again: &[crate::trace::Frame]) -> Verification {

@@ -28,6 +28,8 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
         "causes" => results.iter().map(causes).collect::<Vec<_>>(),
         "mean_calls" => real(|result| result.mean_calls),
         "mean_sim_secs" => real(|result| result.mean_sim_secs),
+        "pushes" => results.iter().map(|result| result.pushes).collect::<Vec<_>>(),
+        "toppled" => results.iter().map(|result| result.toppled).collect::<Vec<_>>(),
     );
     write(table.map_err(ReportError::Query)?)
 }

@@ -19,7 +19,7 @@ use crate::report::interval::wilson;
 use crate::report::summary::{Aggregate, Divergence, SuiteResult};
 use crate::report::{PaperValue, ReportError, order};
 
-const COLUMNS: [(&str, DataType); 11] = [
+const COLUMNS: [(&str, DataType); 13] = [
     ("variant", DataType::String),
     ("suite", DataType::String),
     ("training_seed", DataType::Int64),
@@ -31,6 +31,8 @@ const COLUMNS: [(&str, DataType); 11] = [
     ("divergence_kind", DataType::String),
     ("divergence_program", DataType::String),
     ("sim_secs", DataType::Float64),
+    ("pushes", DataType::Int64),
+    ("toppled", DataType::Int64),
 ];
 
 const KEY: [&str; 3] = ["variant", "suite", "training_seed"];
@@ -88,6 +90,9 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         col("success").cast(DataType::Int64).sum().alias("successes"),
         col("calls").sum(),
         micros.alias("sim_micros"),
+        col("pushes").count().alias("disturbed"),
+        col("pushes").sum(),
+        col("toppled").sum(),
     ];
     let by_seed = all.clone().group_by(key()).agg(sums).sort(KEY, SortMultipleOptions::default());
     let table = collect(by_seed, paths)?;
@@ -95,6 +100,7 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
     let (variants, suites, seeds) = (rows.text("variant")?, rows.text("suite")?, rows.whole("training_seed")?);
     let (episodes, distinct) = (rows.whole("episodes")?, rows.whole("distinct")?);
     let (successes, calls, micros) = (rows.whole("successes")?, rows.whole("calls")?, rows.whole("sim_micros")?);
+    let (disturbed, pushes, toppled) = (rows.whole("disturbed")?, rows.whole("pushes")?, rows.whole("toppled")?);
     let mut causes = causes(all, paths)?;
     let mut results = Vec::with_capacity(table.height());
     for row in 0..table.height() {
@@ -116,6 +122,8 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
             wilson_high,
             mean_calls: calls[row] as f64 / n,
             mean_sim_secs: micros[row] as f64 / MICROS_PER_SEC / n,
+            pushes: (disturbed[row] > 0).then_some(pushes[row] as u64),
+            toppled: (disturbed[row] > 0).then_some(toppled[row] as u64),
         });
     }
     results.sort_by_cached_key(|result| (order::suite(&result.suite), order::variant(&result.variant), result.seed));

@@ -64,6 +64,10 @@ pub struct SuiteResult {
     pub mean_calls: f64,
     /// Simulated seconds a rollout, on average.
     pub mean_sim_secs: f64,
+    /// An adversary's pushes in all rollouts; `None` in a suite without one.
+    pub pushes: Option<u64>,
+    /// The bodies that they toppled.
+    pub toppled: Option<u64>,
 }
 
 /// One variant in one suite, over training seeds.

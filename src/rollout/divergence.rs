@@ -68,19 +68,18 @@ fn subtree(calls: &[ProgramCall], position: usize) -> &[ProgramCall] {
     &calls[position..after.map_or(calls.len(), |n_below| position + 1 + n_below)]
 }
 
-/// Where `calls` (the root's first) leave what is expected.
-pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall]) -> Option<Divergence> {
-    let decided = calls.iter().skip(1);
-    let differing = decided.enumerate().find_map(|(decision, call)| {
-        let kind = match expected.get(decision) {
-            Some(wanted) => difference(call, wanted),
-            None => Some(DivergenceKind::End),
-        };
-        kind.map(|kind| (decision, call, kind))
-    });
-    let (decision, call, kind) = differing?;
-    let caller = call.caller.map_or(call.program, |caller| calls[caller.0 as usize].program);
-    Some(Divergence { decision: decision as u32, kind, program: caller })
+/// How a decision of `program` leaves what is expected; nothing when it does not.
+pub(super) fn divergence(
+    decision: u32,
+    program: Program,
+    call: &ProgramCall,
+    wanted: Option<&ProgramCall>,
+) -> Option<Divergence> {
+    let kind = match wanted {
+        Some(wanted) => difference(call, wanted),
+        None => Some(DivergenceKind::End),
+    };
+    kind.map(|kind| Divergence { decision, kind, program })
 }
 
 fn difference(call: &ProgramCall, wanted: &ProgramCall) -> Option<DivergenceKind> {

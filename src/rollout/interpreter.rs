@@ -9,10 +9,10 @@ use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
 use crate::program::Program;
 use crate::robot::{Action, RobotApi};
-use crate::rollout::divergence::first_divergence;
-use crate::rollout::{Decision, Divergence, Policy, Query, Specification, expected_calls};
+use crate::rollout::divergence::divergence;
+use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
 use crate::task::{Task, goal_holds};
-use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, ProgramCall, Provenance, TraceError};
+use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Push, TraceError};
 
 /// An episode about to be acted: a demonstration, and a world of another trial.
 pub struct Start<'t> {
@@ -29,11 +29,15 @@ pub struct Start<'t> {
 /// When a rollout is given up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Decisions allowed, as a multiple of what the expert needs.
+    /// Decisions allowed, as a multiple of what the expert needs. What an adversary topples must be done again and is
+    /// counted in.
     pub decisions_factor: f32,
     /// Deepest stack of running programs.
     pub max_depth: u8,
 }
+
+/// However much is toppled, a rollout is given up after so many times the limit that it has without an adversary.
+const MOST_REPETITIONS: usize = 10;
 
 impl Default for Limits {
     fn default() -> Self {
@@ -50,6 +54,8 @@ pub struct RolloutEpisode {
     pub decisions: u32,
     /// The first that differs from the expert's; `None` when none does.
     pub first_divergence: Option<Divergence>,
+    /// What an adversary did; `None` in a world without one.
+    pub pushes: Option<Vec<Push>>,
 }
 
 /// Acts all episodes to their ends. Physics of different episodes runs on the current rayon pool; the result does not
@@ -81,12 +87,12 @@ struct Running<'t> {
     world: Box<dyn RobotApi + Send>,
     provenance: Provenance,
     specification: Arc<Specification>,
-    expected: Vec<ProgramCall>,
+    expectation: Expectation,
     calls: CallRecorder,
     pending: Option<Decision>,
-    max_decisions: u32,
-    max_depth: u8,
+    limits: Limits,
     decisions: u32,
+    first_divergence: Option<Divergence>,
     first_cause: Option<Cause>,
     gave_up: bool,
 }
@@ -95,7 +101,7 @@ impl<'t> Running<'t> {
     fn new(start: Start<'t>, limits: Limits) -> Self {
         let Start { task, demonstration, world, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expected: Vec<ProgramCall> = expected_calls(&demonstration, world.scene()).into_iter().cloned().collect();
+        let expectation = Expectation::new(&demonstration, world.scene());
         let specification = Arc::new(Specification::of(&demonstration));
         Self {
             task,
@@ -104,10 +110,10 @@ impl<'t> Running<'t> {
             calls: CallRecorder::new(task.family.root_program(), specification.whole()),
             specification,
             pending: None,
-            max_decisions: (expected.len() as f32 * limits.decisions_factor) as u32 + 20,
-            max_depth: limits.max_depth,
-            expected,
+            limits,
+            expectation,
             decisions: 0,
+            first_divergence: None,
             first_cause: None,
             gave_up: false,
         }
@@ -131,11 +137,13 @@ impl<'t> Running<'t> {
     /// Carries out the pending decision.
     fn step(&mut self) {
         let Some(decision) = self.pending.take() else { return };
-        self.decisions += 1;
+        let caller = self.calls.top().map_or(Program::None, |top| top.program);
         let Decision { program, scope, argument, end_of_program, prediction } = decision;
         let scope = (program != Program::None).then_some(scope);
         let new = NewCall { program, argument, scope, end_of_program, prediction };
         self.calls.call(new, self.frame());
+        self.compare(caller);
+        self.decisions += 1;
         if let Some(action) = Action::new(program, argument)
             && let Err(cause) = self.world.act(action)
         {
@@ -144,8 +152,25 @@ impl<'t> Running<'t> {
         if !program.is_composite() {
             self.calls.returned(self.frame());
         }
-        let too_deep = self.calls.top().is_some_and(|top| top.depth >= self.max_depth);
-        self.gave_up = self.calls.top().is_some() && (self.decisions >= self.max_decisions || too_deep);
+        let too_deep = self.calls.top().is_some_and(|top| top.depth >= self.limits.max_depth);
+        self.gave_up = self.calls.top().is_some() && (self.decisions >= self.max_decisions() || too_deep);
+    }
+
+    /// Compares the call just made with the expert's, until one differs.
+    fn compare(&mut self, caller: Program) {
+        if self.first_divergence.is_none() {
+            let wanted = self.expectation.next(&self.world.now().observation());
+            let made = self.calls.top();
+            self.first_divergence = made.and_then(|made| divergence(self.decisions, caller, made, wanted.as_ref()));
+        }
+    }
+
+    /// What is toppled costs a sub-task each.
+    fn max_decisions(&self) -> u32 {
+        let toppled: usize = self.world.pushes().into_iter().flatten().map(|push| push.toppled.len()).sum();
+        let alone = self.expectation.n_decisions();
+        let expected = alone + toppled * self.expectation.n_decisions_of_sub_task();
+        (expected.min(MOST_REPETITIONS * alone) as f32 * self.limits.decisions_factor) as u32 + 20
     }
 
     fn frame(&self) -> u32 {
@@ -162,8 +187,6 @@ impl<'t> Running<'t> {
         };
         let frame = self.frame();
         let calls = self.calls.finish(frame);
-        let expected: Vec<&ProgramCall> = self.expected.iter().collect();
-        let first_divergence = first_divergence(&calls, &expected);
         self.provenance.actor = crate::trace::Actor::Policy(variant.to_owned());
         let episode = Episode::new(EpisodeParts {
             provenance: self.provenance,
@@ -173,6 +196,11 @@ impl<'t> Running<'t> {
             calls,
             outcome,
         })?;
-        Ok(RolloutEpisode { episode, decisions: self.decisions, first_divergence })
+        Ok(RolloutEpisode {
+            episode,
+            decisions: self.decisions,
+            first_divergence: self.first_divergence,
+            pushes: self.world.pushes().map(<[Push]>::to_vec),
+        })
     }
 }

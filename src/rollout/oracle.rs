@@ -1,32 +1,29 @@
-//! A policy that repeats the expert's calls: it tests the interpreter, before any learning.
+//! A policy that does what the expert would do: it tests the interpreter, before any learning.
 
-use crate::rollout::{Decision, Policy, Query, Start, expected_calls};
-use crate::trace::ProgramCall;
+use crate::rollout::{Decision, Expectation, Policy, Query, Start};
 
-/// Knows for each episode what the expert would call.
+/// Knows for each episode what the expert would call next. What is knocked over it builds again.
 #[derive(Clone, Debug, Default)]
 pub struct Oracle {
-    expected: Vec<Vec<ProgramCall>>,
+    expectations: Vec<Expectation>,
 }
 
 impl Oracle {
-    /// For episodes `0..expected.len()`; see [`super::expected_calls`].
-    pub fn new(expected: Vec<Vec<ProgramCall>>) -> Self {
-        Self { expected }
+    /// For episodes `0..expectations.len()`.
+    pub fn new(expectations: Vec<Expectation>) -> Self {
+        Self { expectations }
     }
 
     /// For the episodes of [`super::run`] with the same starts.
     pub fn for_starts(starts: &[Start<'_>]) -> Self {
-        let expected = |start: &Start<'_>| {
-            let demonstration = start.demonstration.clone().boundaries_only();
-            expected_calls(&demonstration, start.world.scene()).into_iter().cloned().collect()
-        };
-        Self::new(starts.iter().map(expected).collect())
+        let expectation =
+            |start: &Start<'_>| Expectation::new(&start.demonstration.clone().boundaries_only(), start.world.scene());
+        Self::new(starts.iter().map(expectation).collect())
     }
 
-    fn decide_one(&self, query: &Query) -> Decision {
-        let calls = self.expected.get(query.episode);
-        match calls.and_then(|calls| calls.get(query.decision as usize)) {
+    fn decide_one(&mut self, query: &Query) -> Decision {
+        let expectation = self.expectations.get_mut(query.episode);
+        match expectation.and_then(|expectation| expectation.next(&query.observation)) {
             Some(call) => Decision {
                 program: call.program,
                 scope: call.output.filter(|_| call.program.is_composite()).unwrap_or(query.window),

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::rollout::RolloutEpisode;
 use crate::table::{self, Column, TableError, TableSchema};
+use crate::trace::Push;
 
 /// One row an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,6 +31,9 @@ struct RolloutRow {
     divergence_kind: Option<String>,
     divergence_program: Option<String>,
     sim_secs: f64,
+    /// `None` without an adversary.
+    pushes: Option<i64>,
+    toppled: Option<i64>,
 }
 
 impl RolloutRows {
@@ -85,6 +89,8 @@ impl RolloutRows {
             ("divergence_kind", optional(|row| &row.divergence_kind)),
             ("divergence_program", optional(|row| &row.divergence_program)),
             ("sim_secs", Column::Float64(rows.iter().map(|row| row.sim_secs).collect())),
+            ("pushes", Column::OptionalInt64(rows.iter().map(|row| row.pushes).collect())),
+            ("toppled", Column::OptionalInt64(rows.iter().map(|row| row.toppled).collect())),
         ];
         table::write(path, &TableSchema::ROLLOUTS, columns)
     }
@@ -111,6 +117,8 @@ impl RolloutRows {
         let mut divergence_kind = columns.optional_text("divergence_kind")?.into_iter();
         let mut divergence_program = columns.optional_text("divergence_program")?.into_iter();
         let mut sim_secs = columns.float64("sim_secs")?.into_iter();
+        let mut pushes = columns.optional_int64("pushes")?.into_iter();
+        let mut toppled = columns.optional_int64("toppled")?.into_iter();
         let mut next = || {
             Some(RolloutRow {
                 variant: variant.next()?,
@@ -128,6 +136,8 @@ impl RolloutRows {
                 divergence_kind: divergence_kind.next()?,
                 divergence_program: divergence_program.next()?,
                 sim_secs: sim_secs.next()?,
+                pushes: pushes.next()?,
+                toppled: toppled.next()?,
             })
         };
         Ok(Self { rows: std::iter::from_fn(&mut next).collect() })
@@ -136,7 +146,8 @@ impl RolloutRows {
 
 impl RolloutRow {
     fn of(suite: &str, training_seed: u64, rollout: &RolloutEpisode) -> Self {
-        let RolloutEpisode { episode, decisions, first_divergence } = rollout;
+        let RolloutEpisode { episode, decisions, first_divergence, pushes } = rollout;
+        let n_toppled = |pushes: &Vec<Push>| pushes.iter().map(|push| push.toppled.len()).sum::<usize>() as i64;
         let provenance = &episode.provenance;
         let last_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
         Self {
@@ -155,6 +166,8 @@ impl RolloutRow {
             divergence_kind: first_divergence.map(|divergence| divergence.kind.name().to_owned()),
             divergence_program: first_divergence.map(|divergence| divergence.program.name().to_owned()),
             sim_secs: last_nanos as f64 / 1e9,
+            pushes: pushes.as_ref().map(|pushes| pushes.len() as i64),
+            toppled: pushes.as_ref().map(n_toppled),
         }
     }
 }

@@ -17,6 +17,8 @@ mod model;
 #[cfg(test)]
 mod pipeline;
 #[cfg(test)]
+mod pipeline_suites;
+#[cfg(test)]
 mod recording;
 #[cfg(test)]
 mod report;

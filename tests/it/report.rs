@@ -44,6 +44,8 @@ fn rollouts_table(rows: &[Rollout]) -> DataFrame {
         "divergence_kind" => maybe(|row| row.divergence.map(|(_, kind, _)| kind)),
         "divergence_program" => maybe(|row| row.divergence.map(|(.., program)| program)),
         "sim_secs" => rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect::<Vec<_>>(),
+        "pushes" => rows.iter().map(|row| (row.variant == "ntp").then_some(row.episode)).collect::<Vec<_>>(),
+        "toppled" => rows.iter().map(|row| (row.variant == "ntp").then_some(2 * row.episode)).collect::<Vec<_>>(),
     )
     .unwrap()
 }
@@ -139,10 +141,10 @@ fn ten_rollouts_become_a_results_table() {
     let run = Run::new(&ten_rollouts());
     run.make();
     insta::assert_snapshot!(run.text("results.csv"), @r#"
-    variant,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs
-    ntp,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000
-    ntp,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000
-    flat,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000
+    variant,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs,pushes,toppled
+    ntp,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000,10,20
+    ntp,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000,3,6
+    flat,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000,,
     "#);
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use ntp::program::Program;
-use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, Start, expected_calls, run};
+use ntp::rollout::{Decision, Expectation, Limits, Oracle, Policy, Query, Start, run};
 use ntp::task::{Split, Task};
 use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Span};
 use ntp::visualize::{Replay, VisualizeError, save, save_replays};
@@ -56,7 +56,7 @@ fn rollout(task: &Task) -> (Episode, Episode) {
         world: Box::new(KinematicWorld::new(task.family, &own_trial)),
         provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 42),
     };
-    let expected = expected_calls(&start.demonstration, start.world.scene()).into_iter().cloned().collect();
+    let expected = Expectation::new(&start.demonstration, start.world.scene());
     let mut policy = Sure(Oracle::new(vec![expected]));
     let episode = run(&mut policy, vec![start], Limits::default()).unwrap().remove(0).episode;
     (shown, smooth(episode))

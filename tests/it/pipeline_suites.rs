@@ -1,0 +1,129 @@
+//! Suites under an adversary and of another order, from a task file of the authors' form, through every stage.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+
+/// Stacks of two and three of eight cubes: a task for each pair of towers.
+fn authors_file(n_tasks: usize) -> Value {
+    let names: Vec<String> = ('A'..='H').map(|letter| format!("block_{letter}")).collect();
+    let task = |idx: usize| {
+        let block = |place: usize| &names[(place * (1 + 2 * (idx % 4)) + idx) % 8];
+        let pairs: Vec<Value> =
+            [(1, 0), (2, 1), (4, 3)].map(|(src, target)| json!({"src": block(src), "target": block(target)})).into();
+        let with = |key: &str, word: &str| -> Vec<Value> {
+            let add = |mut pair: Value| {
+                pair[key] = json!(word);
+                pair
+            };
+            pairs.iter().cloned().map(add).collect()
+        };
+        json!({"id": format!("authors_{idx}"), "goals": with("name", "pick_place"), "end_constraints": with("type", "on_top")})
+    };
+    json!({"scene": {"task_objects": names}, "tasks": (0..n_tasks).map(task).collect::<Vec<_>>()})
+}
+
+const PIPELINE: &str = r#"
+name = "imported"
+seed = 2
+[tasks]
+family = "block_stacking"
+train = 4
+import = "authors.json"
+[generate]
+trials_per_task = 2
+[[models]]
+variant = "ntp"
+[models.training]
+steps = 4
+[rollout]
+record = 2
+oracle = true
+[[rollout.suites]]
+name = "stacking_unseen"
+split = "unseen"
+episodes = 4
+[[rollout.suites]]
+name = "stacking_topology"
+split = "seen"
+order = "shuffled"
+episodes = 4
+[[rollout.suites]]
+name = "stacking_adversary"
+split = "unseen"
+adversary = { probability = 0.5 }
+episodes = 4
+"#;
+
+/// Writes pipeline and task file into a folder.
+fn write(folder: &Path, pipeline: &str, n_tasks: usize) -> String {
+    std::fs::write(folder.join("authors.json"), authors_file(n_tasks).to_string()).unwrap();
+    let path = folder.join("imported.toml");
+    std::fs::write(&path, pipeline).unwrap();
+    path.to_string_lossy().into_owned()
+}
+
+fn ntp(arguments: &[&str]) -> (i32, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ntp"));
+    let output = command.args(arguments).stdin(Stdio::null()).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn imported_tasks_run_through_every_stage_and_suite() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), PIPELINE, 8);
+    let out = folder.path().join("run");
+    let (code, _, stderr) = ntp(&["run", &path, "--out", &out.to_string_lossy()]);
+    assert_eq!(code, 0, "{stderr}");
+    let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+    let of_oracle = |suite: &str| {
+        let results = report["results"].as_array().unwrap();
+        let row = results.iter().find(|row| row["variant"] == "oracle" && row["suite"] == suite);
+        row.unwrap_or_else(|| panic!("{suite} is missing: {report:#}")).clone()
+    };
+    for suite in ["stacking_unseen", "stacking_topology"] {
+        assert_eq!(of_oracle(suite)["successes"], 4, "{suite}");
+        assert_eq!(of_oracle(suite)["pushes"], Value::Null, "{suite} has no adversary");
+    }
+    let pushes = of_oracle("stacking_adversary")["pushes"].as_u64().unwrap();
+    let toppled = of_oracle("stacking_adversary")["toppled"].as_u64().unwrap();
+    assert!(pushes > 0 && toppled > 0, "{pushes} pushes toppled {toppled} blocks");
+    let recorded = out.join("rollouts/oracle/stacking_adversary").to_string_lossy().into_owned();
+    let (code, stdout, stderr) = ntp(&["replay", &recorded, "--episode", "1", "--verify"]);
+    assert_eq!(code, 0, "pushes repeat when an episode is simulated again: {stdout} {stderr}");
+}
+
+#[track_caller]
+fn check_refused(pipeline: &str, n_tasks: usize, code: i32, expected: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), pipeline, n_tasks);
+    let (found, _, stderr) = ntp(&["run", &path, "--out", &folder.path().join("run").to_string_lossy()]);
+    assert_eq!(found, code, "{stderr}");
+    for part in expected {
+        assert!(stderr.contains(part), "{stderr} does not say {part}");
+    }
+}
+
+#[test]
+fn fewer_tasks_in_the_file_than_the_split_asks_for_are_refused_with_both_numbers() {
+    check_refused(PIPELINE, 3, 1, &["authors.json", "4 training tasks", "3 tasks"]);
+    let unseen = PIPELINE.replace("train = 4", "train = 4\nunseen = 9");
+    check_refused(&unseen, 8, 2, &["imported.toml", "tasks.unseen", "13 tasks in all", "holds 8"]);
+    check_refused(PIPELINE, 4, 2, &["rollout.suites.stacking_unseen.split", "no such task"]);
+}
+
+#[test]
+fn settings_of_suites_out_of_range_are_refused_by_key() {
+    let with = |adversary: &str| PIPELINE.replace("probability = 0.5", adversary);
+    let key = "rollout.suites[2].adversary";
+    check_refused(&with("probability = 1.5"), 8, 2, &["imported.toml", key, "probability is 1.5", "0 to 1"]);
+    check_refused(&with("impulse_ns = -1.0"), 8, 2, &["imported.toml", key, "impulse_ns is -1", "above 0"]);
+    check_refused(&with("force = 1.0"), 8, 2, &["imported.toml", "force", "probability", "impulse_ns"]);
+    let order = PIPELINE.replace("\"shuffled\"", "\"backwards\"");
+    check_refused(&order, 8, 2, &["imported.toml", "backwards", "own", "shuffled"]);
+    let sorting = PIPELINE.replace("block_stacking", "object_sorting").replace("import", "# import");
+    check_refused(&sorting, 8, 2, &["rollout.suites[1].order", "object_sorting builds no towers", "block_stacking"]);
+}
