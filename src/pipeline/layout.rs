@@ -47,9 +47,9 @@ impl RunDir {
         self.stage(Stage::Train, &format!("models/{name}"))
     }
 
-    /// `rollouts/<model>/<suite>/`.
-    pub fn rollouts(&self, model: &str, suite: &str) -> StageDir {
-        self.stage(Stage::Rollout, &format!("rollouts/{model}/{suite}"))
+    /// `rollouts/<model>-<decoder>/<suite>/`, or `rollouts/oracle/<suite>/`.
+    pub fn rollouts(&self, actor: &str, suite: &str) -> StageDir {
+        self.stage(Stage::Rollout, &format!("rollouts/{actor}/{suite}"))
     }
 
     /// `report/`.

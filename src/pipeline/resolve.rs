@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::artifact;
+use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
-use crate::pipeline::{CountsSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::pipeline::{CountsSpec, ModelSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::task::{Family, MAX_INSTANCES, Split};
 
 /// A checked pipeline.
@@ -157,8 +158,32 @@ impl Pipeline {
             if let Err(problem) = model.training.check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
+            self.check_acting(idx, model)?;
         }
         Ok(())
+    }
+
+    /// How a model acts, and what.
+    fn check_acting(&self, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
+        let key = |field: &str| format!("models[{idx}].{field}");
+        if model.decoders.is_empty() {
+            return Err(self.value(&key("decoders"), format!("is empty; allowed are {}", decoder_names())));
+        }
+        if let Some(twice) = first_repeated(&model.decoders) {
+            return Err(self.value(&key("decoders"), format!("{} is there twice", twice.name())));
+        }
+        let Some(suites) = &model.suites else { return Ok(()) };
+        if let Some(twice) = first_repeated(suites) {
+            return Err(self.value(&key("suites"), format!("{twice:?} is there twice")));
+        }
+        let known: Vec<&str> = self.spec.rollout.suites.iter().map(|suite| suite.name.as_str()).collect();
+        match suites.iter().find(|name| !known.contains(&name.as_str())) {
+            Some(name) => {
+                let problem = format!("{name:?} is no suite of this file; there are {}", known.join(", "));
+                Err(self.value(&key("suites"), problem))
+            }
+            None => Ok(()),
+        }
     }
 
     fn check_suite(&self, idx: usize, suite: &SuiteSpec) -> Result<(), PipelineError> {
@@ -177,6 +202,14 @@ impl Pipeline {
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)
     }
+}
+
+fn first_repeated<T: PartialEq>(items: &[T]) -> Option<&T> {
+    items.iter().enumerate().find_map(|(idx, item)| items[..idx].contains(item).then_some(item))
+}
+
+fn decoder_names() -> String {
+    Decoder::ALL.map(Decoder::name).join(", ")
 }
 
 impl SuiteSpec {

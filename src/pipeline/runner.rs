@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 
 use crate::artifact::{ContractError, IoError, Plan, RunLock, StageDir, remove_partials};
+use crate::model::Decoder;
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, convert, generate, report, rollout, tasks, train};
 
 /// What the command line chooses.
@@ -75,7 +76,18 @@ pub(super) enum Part {
     /// A model, by its place in the pipeline file and its seed.
     Model { model: usize, seed: u64 },
     /// A suite acted by a model, or by the oracle.
-    Suite { actor: Option<(usize, u64)>, suite: usize },
+    Suite { actor: Option<ModelActor>, suite: usize },
+}
+
+/// A trained model with a way to decode: who acts a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ModelActor {
+    /// Its place in the pipeline file.
+    pub(super) model: usize,
+    /// The seed of its training.
+    pub(super) seed: u64,
+    /// How it decodes scopes.
+    pub(super) decoder: Decoder,
 }
 
 /// What every stage is given.

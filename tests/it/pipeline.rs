@@ -195,7 +195,7 @@ fn validate_names_a_flipped_byte() {
 fn an_episode_simulated_again_is_the_same_in_every_frame() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(run_smoke(folder.path(), &[]).0, 0);
-    for part in ["recordings", "rollouts/oracle/stacking_unseen", "rollouts/ntp-seed0/stacking_unseen"] {
+    for part in ["recordings", "rollouts/oracle/stacking_unseen", "rollouts/ntp-seed0-mss/stacking_unseen"] {
         let path = folder.path().join(part);
         let (code, stdout, stderr) = run(&["replay", path.to_string_lossy().as_ref(), "--episode", "1", "--verify"]);
         assert_eq!(code, 0, "{part}: {stdout} {stderr}");
@@ -243,6 +243,10 @@ fn a_wrong_pipeline_file_names_file_key_and_what_is_allowed_and_writes_nothing()
     check_refused(|text| text.replace("steps = 6", "steps = 0"), "training", "at least 1");
     check_refused(|text| text.replace("split = \"unseen\"", "split = \"unknown\""), "unknown", "seen");
     check_refused(|text| text.replace("name = \"smoke\"", "name = \"a/b\""), "name", "letters");
+    let model = |more: &'static str| move |text: &str| text.replace("\"ntp\"\n", &format!("\"ntp\"\n{more}\n"));
+    check_refused(model("decoders = []"), "models[0].decoders", "argmax, mss, am");
+    check_refused(model("decoders = [\"mss\", \"mss\"]"), "models[0].decoders", "mss is there twice");
+    check_refused(model("suites = [\"stacking\"]"), "models[0].suites", "there are stacking_unseen");
     let counts = "episodes = 4\non_table = { min = 1, max = 2 }";
     check_refused(|text| text.replace("episodes = 4\n", &format!("{counts}\n")), "on_table", "no categories");
 }
