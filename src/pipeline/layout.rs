@@ -23,6 +23,11 @@ impl RunDir {
         &self.root
     }
 
+    /// The run directory of an experiment of a study.
+    pub fn experiment(&self, name: &str) -> Self {
+        Self { root: self.root.join(name) }
+    }
+
     fn stage(&self, stage: Stage, folder: &str) -> StageDir {
         StageDir::new(stage.name(), self.root.join(folder))
     }

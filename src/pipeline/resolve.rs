@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::de::DeserializeOwned;
+
 use crate::artifact;
 use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
@@ -29,11 +31,7 @@ impl Pipeline {
     /// [`PipelineError::Syntax`] or [`PipelineError::Value`], which name file, key and what is allowed; an I/O error
     /// when the file is not there.
     pub fn load(path: &Path) -> Result<Self, PipelineError> {
-        let syntax = |message: String| PipelineError::Syntax { path: path.to_owned(), message };
-        let bytes = std::fs::read(path).map_err(|error| syntax(format!("cannot be read: {error}")))?;
-        let text = String::from_utf8(bytes).map_err(|error| syntax(format!("is not UTF-8: {error}")))?;
-        let spec: PipelineSpec = toml::from_str(&text).map_err(|error| syntax(format!("\n{error}")))?;
-        let pipeline = Self { path: path.to_owned(), spec };
+        let pipeline = Self { path: path.to_owned(), spec: parse(path)? };
         pipeline.check()?;
         Ok(pipeline)
     }
@@ -67,7 +65,7 @@ impl Pipeline {
     }
 
     fn check(&self) -> Result<(), PipelineError> {
-        self.check_name("name", &self.spec.name)?;
+        check_name(&self.path, "name", &self.spec.name)?;
         self.check_tasks()?;
         self.check_generate()?;
         self.check_models()?;
@@ -75,15 +73,6 @@ impl Pipeline {
         let factor = self.spec.rollout.decisions_factor;
         if !(1.0..=100.0).contains(&factor) {
             return Err(self.value("rollout.decisions_factor", format!("is {factor}; allowed is 1 to 100")));
-        }
-        Ok(())
-    }
-
-    fn check_name(&self, key: &str, name: &str) -> Result<(), PipelineError> {
-        let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if name.is_empty() || name.len() > 64 || !name.chars().all(allowed) {
-            let problem = format!("is {name:?}; allowed are 1 to 64 letters, digits, '_' and '-'");
-            return Err(self.value(key, problem));
         }
         Ok(())
     }
@@ -188,7 +177,7 @@ impl Pipeline {
 
     fn check_suite(&self, idx: usize, suite: &SuiteSpec) -> Result<(), PipelineError> {
         let key = |field: &str| format!("rollout.suites[{idx}].{field}");
-        self.check_name(&key("name"), &suite.name)?;
+        check_name(&self.path, &key("name"), &suite.name)?;
         let earlier = &self.spec.rollout.suites[..idx];
         if earlier.iter().any(|other| other.name == suite.name) {
             return Err(self.value(&key("name"), format!("{:?} is there twice", suite.name)));
@@ -202,6 +191,29 @@ impl Pipeline {
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)
     }
+}
+
+/// The text of a file that people write.
+pub(super) fn read_text(path: &Path) -> Result<String, PipelineError> {
+    let syntax = |message: String| PipelineError::Syntax { path: path.to_owned(), message };
+    let bytes = std::fs::read(path).map_err(|error| syntax(format!("cannot be read: {error}")))?;
+    String::from_utf8(bytes).map_err(|error| syntax(format!("is not UTF-8: {error}")))
+}
+
+/// Reads a TOML file as what it shall be.
+pub(super) fn parse<T: DeserializeOwned>(path: &Path) -> Result<T, PipelineError> {
+    let syntax = |error| PipelineError::Syntax { path: path.to_owned(), message: format!("\n{error}") };
+    toml::from_str(&read_text(path)?).map_err(syntax)
+}
+
+/// Whether a name can be a folder's everywhere.
+pub(super) fn check_name(path: &Path, key: &str, name: &str) -> Result<(), PipelineError> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(allowed) {
+        let problem = format!("is {name:?}; allowed are 1 to 64 letters, digits, '_' and '-'");
+        return Err(PipelineError::Value { path: path.to_owned(), key: key.to_owned(), problem });
+    }
+    Ok(())
 }
 
 fn first_repeated<T: PartialEq>(items: &[T]) -> Option<&T> {

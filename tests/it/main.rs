@@ -27,6 +27,8 @@ mod schemas;
 #[cfg(test)]
 mod sim;
 #[cfg(test)]
+mod study;
+#[cfg(test)]
 mod table;
 #[cfg(test)]
 mod task;
