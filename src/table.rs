@@ -15,11 +15,13 @@
 //! so that readers tell lists of fixed size from others.
 
 mod column;
+mod encode;
 mod error;
 mod guard;
 mod kind;
 mod read;
 mod schema;
+mod values;
 mod write;
 
 pub use column::{Column, Columns};
@@ -27,5 +29,6 @@ pub use error::TableError;
 pub use kind::{ColumnKind, Form, Value};
 pub use read::{TableReader, read};
 pub use schema::TableSchema;
+pub(crate) use values::Values;
 pub use write::write;
 pub(crate) use write::{TableWriter, WriteOptions};

@@ -14,6 +14,7 @@
 //!
 //! Paper, section IV, "Model Training".
 
+mod augment;
 mod batch;
 mod checkpoint;
 mod config;

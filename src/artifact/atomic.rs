@@ -36,6 +36,13 @@ pub enum IoError {
 }
 
 impl IoError {
+    /// The file that it is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::System { path, .. } | Self::Json { path, .. } => path,
+        }
+    }
+
     /// Names action and path of a system error.
     pub fn system(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();

@@ -10,7 +10,7 @@ use crate::commands::kind::{self, Kind};
 use crate::commands::{CommandOutcome, output, replay};
 use crate::rollout::RolloutRows;
 use crate::task::{Split, TaskSet};
-use crate::{model, recording};
+use crate::{dataset, model, recording};
 
 pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
     let description = describe(&args.path)?;
@@ -28,7 +28,7 @@ fn describe(path: &Path) -> anyhow::Result<Value> {
         Kind::Recording => serde_json::to_value(recording::inspect(path)?)?,
         Kind::Recordings => recordings(path)?,
         Kind::Tasks => tasks(path)?,
-        Kind::Dataset => artifact::read_json(&path.join("meta/info.json"))?,
+        Kind::Dataset => serde_json::to_value(dataset::summarize(path)?)?,
         Kind::Model => serde_json::to_value(model::inspect(path)?)?,
         Kind::Rollouts => rollouts(path)?,
         Kind::Report => report(path)?,

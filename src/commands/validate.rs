@@ -25,6 +25,7 @@ struct Finding {
 #[derive(Debug, Default, Serialize)]
 struct Validation {
     checked: Vec<String>,
+    warnings: Vec<Finding>,
     findings: Vec<Finding>,
 }
 
@@ -48,8 +49,9 @@ pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
 
 fn to_text(validation: &Validation) -> String {
     let mut lines: Vec<String> = validation.checked.iter().map(|line| format!("ok      {line}")).collect();
-    let findings = validation.findings.iter();
-    lines.extend(findings.map(|finding| format!("{}  {}: {}", finding.code, finding.path.display(), finding.message)));
+    let line = |finding: &Finding| format!("{}  {}: {}", finding.code, finding.path.display(), finding.message);
+    lines.extend(validation.warnings.iter().map(|warning| format!("warning {}", line(warning))));
+    lines.extend(validation.findings.iter().map(line));
     lines.push(match validation.findings.len() {
         0 => "nothing wrong".to_owned(),
         1 => "1 finding".to_owned(),
@@ -66,7 +68,10 @@ fn check(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result
         Kind::Recording => check_recording(path).map(|episodes| format!("{episodes} episodes")),
         Kind::Recordings => check_recordings(path),
         Kind::Tasks => check_tasks(path),
-        Kind::Dataset => return check_dataset(path, validation),
+        Kind::Dataset => {
+            check_dataset(path, validation);
+            return Ok(());
+        }
         Kind::Model => model::inspect(path).map(|found| format!("{} parameters", found.parameters)).map_err(Into::into),
         Kind::Rollouts => check_rollouts(path),
         Kind::Report | Kind::Run => Ok("report".to_owned()),
@@ -141,8 +146,25 @@ fn check_rollouts(path: &Path) -> anyhow::Result<String> {
     Ok(format!("{episodes} episodes, {successes} succeeded"))
 }
 
-fn check_dataset(path: &Path, validation: &mut Validation) -> anyhow::Result<()> {
-    let trials = dataset::read_trials(path)?;
-    validation.checked.push(format!("{}: dataset, {} successful episodes", path.display(), trials.trials.len()));
-    Ok(())
+/// Every cross-reference of a dataset; warnings are told, but fail nothing.
+fn check_dataset(path: &Path, validation: &mut Validation) {
+    let found = dataset::validate(path);
+    if found.is_valid() {
+        let dataset::Validation { episodes, frames, calls, scopes, .. } = found;
+        let held = format!("{episodes} episodes, {frames} frames, {calls} calls, {scopes} scoping labels");
+        validation.checked.push(format!("{}: dataset, {held}", path.display()));
+    }
+    for finding in found.findings {
+        let is_warning = finding.severity == dataset::Severity::Warning;
+        let message = match finding.place.as_str() {
+            "" => finding.message,
+            place => format!("{place}: {}", finding.message),
+        };
+        let finding = Finding { code: finding.code, path: finding.path, message };
+        if is_warning { &mut validation.warnings } else { &mut validation.findings }.push(finding);
+    }
+    if found.findings_left_out > 0 {
+        let message = format!("{} more findings", found.findings_left_out);
+        validation.findings.push(Finding { code: "DATASET", path: path.to_owned(), message });
+    }
 }

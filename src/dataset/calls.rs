@@ -1,15 +1,11 @@
 //! The rows of `ntp/calls/` and `ntp/scopes/`: the program tree and the scoping labels derived from it.
 
 use std::iter::repeat_n;
-use std::sync::Arc;
-
-use arrow::array::{ArrayRef, BooleanArray, Int32Array, Int64Array};
-use arrow::error::ArrowError;
 
 use crate::dataset::episode_view::{CallSpans, EpisodeView};
 use crate::dataset::text::TextTable;
 use crate::program::Program;
-use crate::table::WriteOptions;
+use crate::table::{Values, WriteOptions};
 use crate::trace::{ProgramCall, ScopingLabel};
 
 /// Calls that are not yet written.
@@ -20,9 +16,9 @@ pub(crate) struct CallRows {
     caller_id: Vec<Option<i64>>,
     depth: Vec<i64>,
     step: Vec<i64>,
-    program: Vec<i32>,
+    program: Vec<u32>,
     argument_slot: Vec<Option<i64>>,
-    argument: Vec<Option<i32>>,
+    argument: Vec<Option<u32>>,
     input_begin: Vec<i64>,
     input_end: Vec<i64>,
     output_begin: Vec<Option<i64>>,
@@ -30,10 +26,15 @@ pub(crate) struct CallRows {
     frame_begin: Vec<i64>,
     frame_end: Vec<i64>,
     end_of_program: Vec<bool>,
+    programs: Vec<String>,
     slots: TextTable,
 }
 
 impl CallRows {
+    pub(crate) fn new() -> Self {
+        Self { programs: Program::ALL.map(|program| program.name().to_owned()).into(), ..Self::default() }
+    }
+
     pub(crate) fn n_rows(&self) -> usize {
         self.call_id.len()
     }
@@ -73,7 +74,7 @@ impl CallRows {
         self.caller_id.push(call.caller.map(|caller| i64::from(caller.0)));
         self.depth.push(i64::from(call.depth));
         self.step.push(i64::from(call.step));
-        self.program.push(call.program.index() as i32);
+        self.program.push(call.program.index() as u32);
         self.argument_slot.push(call.argument.map(|slot| i64::from(slot.0)));
         self.argument.push(call.argument.map(|slot| self.slots.key(&view.episode.scene.slot(slot).name)));
         self.input_begin.push(i64::from(spans.input.begin));
@@ -85,29 +86,39 @@ impl CallRows {
         self.end_of_program.push(call.end_of_program);
     }
 
-    /// Takes all rows out as columns.
-    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
-        let mut programs = TextTable::default();
-        for program in Program::ALL {
-            programs.key(program.name());
-        }
-        Ok(vec![
-            ("episode_index", int64(&mut self.episode_index)),
-            ("call_id", int64(&mut self.call_id)),
-            ("caller_id", optional_int64(&mut self.caller_id)),
-            ("depth", int64(&mut self.depth)),
-            ("step", int64(&mut self.step)),
-            ("program", programs.column(Int32Array::from(std::mem::take(&mut self.program)))?),
-            ("argument_slot", optional_int64(&mut self.argument_slot)),
-            ("argument", self.slots.column(Int32Array::from(std::mem::take(&mut self.argument)))?),
-            ("input_begin", int64(&mut self.input_begin)),
-            ("input_end", int64(&mut self.input_end)),
-            ("output_begin", optional_int64(&mut self.output_begin)),
-            ("output_end", optional_int64(&mut self.output_end)),
-            ("frame_begin", int64(&mut self.frame_begin)),
-            ("frame_end", int64(&mut self.frame_end)),
-            ("end_of_program", Arc::new(BooleanArray::from(std::mem::take(&mut self.end_of_program)))),
-        ])
+    /// The columns of all rows.
+    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); 15] {
+        [
+            ("episode_index", Values::Int64(&self.episode_index)),
+            ("call_id", Values::Int64(&self.call_id)),
+            ("caller_id", Values::OptionalInt64(&self.caller_id)),
+            ("depth", Values::Int64(&self.depth)),
+            ("step", Values::Int64(&self.step)),
+            ("program", Values::Word(&self.program, &self.programs)),
+            ("argument_slot", Values::OptionalInt64(&self.argument_slot)),
+            ("argument", Values::OptionalWord(&self.argument, self.slots.texts())),
+            ("input_begin", Values::Int64(&self.input_begin)),
+            ("input_end", Values::Int64(&self.input_end)),
+            ("output_begin", Values::OptionalInt64(&self.output_begin)),
+            ("output_end", Values::OptionalInt64(&self.output_end)),
+            ("frame_begin", Values::Int64(&self.frame_begin)),
+            ("frame_end", Values::Int64(&self.frame_end)),
+            ("end_of_program", Values::Boolean(&self.end_of_program)),
+        ]
+    }
+
+    /// Forgets all rows, but not the texts.
+    pub(crate) fn clear(&mut self) {
+        [&mut self.episode_index, &mut self.call_id, &mut self.depth, &mut self.step].into_iter().for_each(Vec::clear);
+        [&mut self.input_begin, &mut self.input_end, &mut self.frame_begin, &mut self.frame_end]
+            .into_iter()
+            .for_each(Vec::clear);
+        [&mut self.caller_id, &mut self.argument_slot, &mut self.output_begin, &mut self.output_end]
+            .into_iter()
+            .for_each(Vec::clear);
+        self.program.clear();
+        self.argument.clear();
+        self.end_of_program.clear();
     }
 }
 
@@ -117,7 +128,7 @@ pub(crate) struct ScopeRows {
     episode_index: Vec<i64>,
     call_id: Vec<i64>,
     specification_frame: Vec<i64>,
-    label: Vec<i32>,
+    label: Vec<i64>,
     is_start: Vec<bool>,
     is_end: Vec<bool>,
 }
@@ -130,7 +141,7 @@ impl ScopeRows {
     /// What the schema text cannot say of this table.
     pub(crate) fn options() -> WriteOptions {
         WriteOptions {
-            delta_encoded: vec!["episode_index", "call_id", "specification_frame"],
+            delta_encoded: vec!["episode_index", "call_id", "specification_frame", "label"],
             sorted_by: vec!["episode_index", "call_id"],
             ..WriteOptions::default()
         }
@@ -153,39 +164,35 @@ impl ScopeRows {
         self.call_id.extend(repeat_n(call_id, input.len()));
         self.specification_frame.extend(i64::from(input.begin)..i64::from(input.end));
         let first = self.label.len();
-        self.label.resize(first + input.len(), ScopingLabel::Outside as i32);
+        self.label.resize(first + input.len(), ScopingLabel::Outside as i64);
         self.is_start.resize(first + input.len(), false);
         self.is_end.resize(first + input.len(), false);
         let at = |frame: u32| first + (frame - input.begin) as usize;
-        self.label[at(output.begin)..=at(output.last())].fill(ScopingLabel::Inside as i32);
+        self.label[at(output.begin)..=at(output.last())].fill(ScopingLabel::Inside as i64);
         for frame in [output.last(), output.begin] {
-            self.label[at(frame)] = output.label(frame) as i32;
+            self.label[at(frame)] = output.label(frame) as i64;
         }
         self.is_start[at(output.begin)] = true;
         self.is_end[at(output.last())] = true;
     }
 
-    /// Takes all rows out as columns.
-    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
-        let mut labels = TextTable::default();
-        for label in ScopingLabel::ALL {
-            labels.key(label.name());
-        }
-        Ok(vec![
-            ("episode_index", int64(&mut self.episode_index)),
-            ("call_id", int64(&mut self.call_id)),
-            ("specification_frame", int64(&mut self.specification_frame)),
-            ("label", labels.column(Int32Array::from(std::mem::take(&mut self.label)))?),
-            ("is_start", Arc::new(BooleanArray::from(std::mem::take(&mut self.is_start)))),
-            ("is_end", Arc::new(BooleanArray::from(std::mem::take(&mut self.is_end)))),
-        ])
+    /// The columns of all rows.
+    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); 6] {
+        [
+            ("episode_index", Values::Int64(&self.episode_index)),
+            ("call_id", Values::Int64(&self.call_id)),
+            ("specification_frame", Values::Int64(&self.specification_frame)),
+            ("label", Values::Int64(&self.label)),
+            ("is_start", Values::Boolean(&self.is_start)),
+            ("is_end", Values::Boolean(&self.is_end)),
+        ]
     }
-}
 
-fn int64(values: &mut Vec<i64>) -> ArrayRef {
-    Arc::new(Int64Array::from(std::mem::take(values)))
-}
-
-fn optional_int64(values: &mut Vec<Option<i64>>) -> ArrayRef {
-    Arc::new(Int64Array::from(std::mem::take(values)))
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        [&mut self.episode_index, &mut self.call_id, &mut self.specification_frame, &mut self.label]
+            .into_iter()
+            .for_each(Vec::clear);
+        [&mut self.is_start, &mut self.is_end].into_iter().for_each(Vec::clear);
+    }
 }

@@ -73,10 +73,14 @@ impl<B: Batch> Cursor<B> {
         DatasetError::Count { path: self.path(), problem: problem.to_owned() }
     }
 
-    /// The file of the row that was read last.
+    /// Which file the row that was read last is in.
+    pub(crate) fn place(&self) -> FilePlace {
+        self.open.as_ref().map_or(FilePlace::default(), |open| open.place)
+    }
+
+    /// The path of that file.
     pub(crate) fn path(&self) -> PathBuf {
-        let place = self.open.as_ref().map_or(FilePlace::default(), |open| open.place);
-        place.in_dataset(&self.root, self.folder)
+        self.place().in_dataset(&self.root, self.folder)
     }
 
     /// Names the row that was read last.

@@ -25,6 +25,8 @@ pub(crate) struct EpisodeRow {
     pub(crate) is_success: bool,
     pub(crate) specification: String,
     pub(crate) specification_frames: i64,
+    pub(crate) recording_sha256: String,
+    pub(crate) slots: Vec<String>,
     pub(crate) n_frames: i64,
     pub(crate) n_calls: i64,
     pub(crate) n_scopes: i64,
@@ -44,6 +46,7 @@ struct MetaBatch {
     file: Vec<i64>,
     from: Vec<i64>,
     to: Vec<i64>,
+    own: [Vec<i64>; 2],
 }
 
 impl Batch for MetaBatch {
@@ -55,6 +58,8 @@ impl Batch for MetaBatch {
         "data/file_index",
         "dataset_from_index",
         "dataset_to_index",
+        "meta/episodes/chunk_index",
+        "meta/episodes/file_index",
     ];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
@@ -66,6 +71,7 @@ impl Batch for MetaBatch {
             file: columns.int64("data/file_index")?,
             from: columns.int64("dataset_from_index")?,
             to: columns.int64("dataset_to_index")?,
+            own: [columns.int64("meta/episodes/chunk_index")?, columns.int64("meta/episodes/file_index")?],
         })
     }
 }
@@ -143,12 +149,16 @@ impl EpisodeRows {
         row.first_index = meta.from[at];
         let found = (meta.episode_index[at], meta.length[at], meta.to[at]);
         let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
+        let own = place(meta.own[0][at], meta.own[1][at]);
         let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
         if found != expected {
             return Err(self.meta.problem(format!(
                 "(episode_index, length, dataset_to_index) are {found:?}, but {} makes them {expected:?}",
                 layout::EPISODES
             )));
+        }
+        if own != self.meta.place() {
+            return Err(self.meta.problem(format!("it says that it is in {}", own.relative(layout::META_EPISODES))));
         }
         if !tasks_agree {
             return Err(self.meta.problem(format!("its tasks are not the one of {}", layout::EPISODES)));
@@ -199,8 +209,9 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
     let mut text = |name| Ok::<_, TableError>(columns.text(name)?.into_iter());
     let [mut task_id, mut task_text, mut family] = [text("task_id")?, text("task_text")?, text("family")?];
     let [mut split, mut actor, mut outcome] = [text("split")?, text("actor")?, text("outcome")?];
-    let mut specification = text("specification")?;
+    let [mut specification, mut recording_sha256] = [text("specification")?, text("recording_sha256")?];
     let mut cause = columns.optional_text("cause")?.into_iter();
+    let mut slots = columns.text_list("slots")?.into_iter();
     let success = columns.boolean("success")?;
     let mut number = |name| columns.int64(name);
     let (episode_index, trial) = (number("episode_index")?, number("trial")?);
@@ -222,6 +233,8 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
             is_success: success[at],
             specification: specification.next()?,
             specification_frames: specification_frames[at],
+            recording_sha256: recording_sha256.next()?,
+            slots: slots.next()?,
             n_frames: n_frames[at],
             n_calls: n_calls[at],
             n_scopes: n_scopes[at],

@@ -1,15 +1,8 @@
 //! The rows per episode: `ntp/episodes.parquet` (provenance) and `meta/episodes/` (what `LeRobot` reads).
 
-use std::sync::Arc;
-
-use arrow::array::{ArrayRef, BooleanArray, Int64Array, ListArray, StringArray};
-use arrow::buffer::OffsetBuffer;
-use arrow::datatypes::{DataType, Field};
-use arrow::error::ArrowError;
-
 use crate::dataset::episode_view::{EpisodeView, is_own_specification};
 use crate::dataset::layout::FilePlace;
-use crate::table::{Column, WriteOptions};
+use crate::table::{Values, WriteOptions};
 
 /// Where the rows of an episode are.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +33,14 @@ macro_rules! column_rows {
         }
 
         impl $rows {
-            /// Takes all rows out as columns.
-            pub(crate) fn take(&mut self) -> Vec<(&'static str, Column)> {
-                vec![$(($name, Column::$kind(std::mem::take(&mut self.$field))),)*]
+            /// The columns of all rows.
+            pub(crate) fn columns(&self) -> Vec<(&'static str, Values<'_>)> {
+                vec![$(($name, Values::$kind(&self.$field)),)*]
+            }
+
+            /// Forgets all rows.
+            pub(crate) fn clear(&mut self) {
+                *self = Self::default();
             }
         }
     };
@@ -108,7 +106,7 @@ impl ProvenanceRows {
         self.recording_index.push(provenance.index as i64);
         self.n_frames.push(view.n_rows() as i64);
         self.n_recorded_frames.push(episode.frames.len() as i64);
-        self.sim_secs.push(episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 * 1e-9));
+        self.sim_secs.push(episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 / 1e9));
         let specification = if is_own_specification(episode) { "episode" } else { "demonstration" };
         self.specification.push(specification.to_owned());
         self.specification_frames.push(view.specification_frames());
@@ -132,12 +130,16 @@ impl ProvenanceRows {
 #[derive(Default)]
 pub(crate) struct MetaRows {
     episode_index: Vec<i64>,
-    task: Vec<String>,
+    tasks: Vec<Vec<String>>,
     length: Vec<i64>,
-    data: Vec<FilePlace>,
+    data_chunk: Vec<i64>,
+    data_file: Vec<i64>,
     from_index: Vec<i64>,
+    to_index: Vec<i64>,
+    own_chunk: Vec<i64>,
+    own_file: Vec<i64>,
     task_id: Vec<String>,
-    split: Vec<&'static str>,
+    split: Vec<String>,
     success: Vec<bool>,
 }
 
@@ -151,44 +153,43 @@ impl MetaRows {
         self.episode_index.len()
     }
 
-    /// Adds an episode.
-    pub(crate) fn append(&mut self, view: &EpisodeView<'_>, places: EpisodePlaces) {
+    /// Adds an episode, whose row goes to the file `own`.
+    pub(crate) fn append(&mut self, view: &EpisodeView<'_>, places: EpisodePlaces, own: FilePlace) {
         let provenance = &view.episode.provenance;
         self.episode_index.push(places.episode_index);
-        self.task.push(provenance.task_text.clone());
+        self.tasks.push(vec![provenance.task_text.clone()]);
         self.length.push(view.n_rows() as i64);
-        self.data.push(places.data);
+        self.data_chunk.push(i64::from(places.data.chunk));
+        self.data_file.push(i64::from(places.data.file));
         self.from_index.push(places.first_index);
+        self.to_index.push(places.first_index + view.n_rows() as i64);
+        self.own_chunk.push(i64::from(own.chunk));
+        self.own_file.push(i64::from(own.file));
         self.task_id.push(provenance.task_id.clone());
-        self.split.push(provenance.split.name());
+        self.split.push(provenance.split.name().to_owned());
         self.success.push(view.episode.outcome.is_success());
     }
 
-    /// Takes all rows out as columns; `place` is the file that they go to.
-    pub(crate) fn take(&mut self, place: FilePlace) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
-        let Self { episode_index, task, length, data, from_index, task_id, split, success } = std::mem::take(self);
-        let n_rows = episode_index.len();
-        let to_index = from_index.iter().zip(&length).map(|(from, length)| from + length).collect();
-        let numbers = |values: Vec<i64>| -> ArrayRef { Arc::new(Int64Array::from(values)) };
-        let of_file =
-            |value: fn(&FilePlace) -> u32| numbers(data.iter().map(|place| i64::from(value(place))).collect());
-        let same = |value: u32| numbers(vec![i64::from(value); n_rows]);
-        let element = Arc::new(Field::new("element", DataType::Utf8, false));
-        let offsets = OffsetBuffer::from_lengths(std::iter::repeat_n(1, n_rows));
-        let tasks = ListArray::try_new(element, offsets, Arc::new(StringArray::from(task)), None)?;
-        Ok(vec![
-            ("episode_index", numbers(episode_index)),
-            ("tasks", Arc::new(tasks)),
-            ("length", numbers(length)),
-            ("data/chunk_index", of_file(|place| place.chunk)),
-            ("data/file_index", of_file(|place| place.file)),
-            ("dataset_from_index", numbers(from_index)),
-            ("dataset_to_index", numbers(to_index)),
-            ("meta/episodes/chunk_index", same(place.chunk)),
-            ("meta/episodes/file_index", same(place.file)),
-            ("ntp/task_id", Arc::new(StringArray::from(task_id))),
-            ("ntp/split", Arc::new(StringArray::from(split))),
-            ("ntp/success", Arc::new(BooleanArray::from(success))),
-        ])
+    /// The columns of all rows.
+    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); 12] {
+        [
+            ("episode_index", Values::Int64(&self.episode_index)),
+            ("tasks", Values::TextList(&self.tasks)),
+            ("length", Values::Int64(&self.length)),
+            ("data/chunk_index", Values::Int64(&self.data_chunk)),
+            ("data/file_index", Values::Int64(&self.data_file)),
+            ("dataset_from_index", Values::Int64(&self.from_index)),
+            ("dataset_to_index", Values::Int64(&self.to_index)),
+            ("meta/episodes/chunk_index", Values::Int64(&self.own_chunk)),
+            ("meta/episodes/file_index", Values::Int64(&self.own_file)),
+            ("ntp/task_id", Values::Text(&self.task_id)),
+            ("ntp/split", Values::Text(&self.split)),
+            ("ntp/success", Values::Boolean(&self.success)),
+        ]
+    }
+
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        *self = Self::default();
     }
 }

@@ -17,9 +17,6 @@ pub enum ConvertError {
     /// A file could not be written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// Columns that do not fit together: a bug.
-    #[error("columns of a table do not fit together: {0}")]
-    Columns(#[from] arrow::error::ArrowError),
     /// The directory has something in it.
     #[error("a dataset is only written into an empty directory, but there is something in {}", path.display())]
     NotEmpty {

@@ -31,7 +31,7 @@ impl Batch for FrameBatch {
 
 impl FrameBatch {
     /// What is wrong with a row that should be frame `frame` of an episode.
-    fn problem(&self, at: usize, row: &EpisodeRow, frame: i64, width: usize) -> Option<String> {
+    pub(crate) fn problem(&self, at: usize, row: &EpisodeRow, frame: i64, width: usize) -> Option<String> {
         let numbers = [
             ("index", self.index[at], row.first_index + frame),
             ("episode_index", self.episode_index[at], row.episode_index),

@@ -2,21 +2,12 @@
 //!
 //! Rows of several episodes are gathered until they are worth a row group; then the buffers begin anew.
 
-use std::sync::Arc;
-
-use arrow::array::{
-    Array as _, ArrayRef, BooleanArray, FixedSizeListArray, Float32Array, Float64Array, Int32Array, Int64Array,
-};
-use arrow::datatypes::{DataType, Field};
-use arrow::error::ArrowError;
-
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
-use crate::dataset::statistics::Numbers;
 use crate::dataset::text::TextTable;
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::table::WriteOptions;
+use crate::table::{Values, WriteOptions};
 use crate::trace::{Frame, Observation};
 
 const POSITION_WIDTH: usize = 3;
@@ -48,7 +39,7 @@ pub(crate) struct FrameRows {
     recording_frame: Vec<i64>,
     gripper: Vec<f32>,
     call_id: Vec<i64>,
-    program: Vec<i32>,
+    program: Vec<u32>,
     paths: Paths,
     subtasks: TextTable,
 }
@@ -111,7 +102,7 @@ impl FrameRows {
             self.index.push(ids.first_index + row as i64);
             self.done.push(is_last);
             self.success.push(is_last && is_success);
-            self.time_secs.push(frame.time_nanos as f64 * 1e-9);
+            self.time_secs.push(frame.time_nanos as f64 / 1e9);
             self.boundary.push(frame.boundary);
             self.recording_frame.push(i64::from(recorded));
             let gripper = frame.state.gripper_in_world.translation.vector;
@@ -165,49 +156,39 @@ impl FrameRows {
         }
     }
 
-    /// The numeric columns in the order of the features, each with the values of all rows.
-    pub(crate) fn numbers(&self) -> [Numbers<'_>; 15] {
-        [
-            Numbers::Float32(&self.state),
-            Numbers::Float32(&self.action),
-            Numbers::Float32(&self.timestamp),
-            Numbers::Int64(&self.frame_index),
-            Numbers::Int64(&self.episode_index),
-            Numbers::Int64(&self.index),
-            Numbers::Int64(&self.task_index),
-            Numbers::Int64(&self.subtask_index),
-            Numbers::Boolean(&self.done),
-            Numbers::Boolean(&self.success),
-            Numbers::Float64(&self.time_secs),
-            Numbers::Boolean(&self.boundary),
-            Numbers::Int64(&self.recording_frame),
-            Numbers::Float32(&self.gripper),
-            Numbers::Int64(&self.call_id),
-        ]
+    /// The columns of all rows.
+    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); FEATURES.len()] {
+        let columns = [
+            Values::Float32Vector(&self.state, Observation::width(self.n_slots)),
+            Values::Float32Vector(&self.action, ACTION_NAMES.len()),
+            Values::Float32(&self.timestamp),
+            Values::Int64(&self.frame_index),
+            Values::Int64(&self.episode_index),
+            Values::Int64(&self.index),
+            Values::Int64(&self.task_index),
+            Values::Int64(&self.subtask_index),
+            Values::Boolean(&self.done),
+            Values::Boolean(&self.success),
+            Values::Float64(&self.time_secs),
+            Values::Boolean(&self.boundary),
+            Values::Int64(&self.recording_frame),
+            Values::Float32Vector(&self.gripper, POSITION_WIDTH),
+            Values::Int64(&self.call_id),
+            Values::Word(&self.program, self.paths.texts.texts()),
+        ];
+        std::array::from_fn(|at| (FEATURES[at].name, columns[at]))
     }
 
-    /// Takes all rows out as columns.
-    pub(crate) fn take(&mut self) -> Result<Vec<(&'static str, ArrayRef)>, ArrowError> {
-        let width = Observation::width(self.n_slots);
-        let columns: [ArrayRef; FEATURES.len()] = [
-            vectors(&mut self.state, width)?,
-            vectors(&mut self.action, ACTION_NAMES.len())?,
-            Arc::new(Float32Array::from(std::mem::take(&mut self.timestamp))),
-            int64(&mut self.frame_index),
-            int64(&mut self.episode_index),
-            int64(&mut self.index),
-            int64(&mut self.task_index),
-            int64(&mut self.subtask_index),
-            boolean(&mut self.done),
-            boolean(&mut self.success),
-            Arc::new(Float64Array::from(std::mem::take(&mut self.time_secs))),
-            boolean(&mut self.boundary),
-            int64(&mut self.recording_frame),
-            vectors(&mut self.gripper, POSITION_WIDTH)?,
-            int64(&mut self.call_id),
-            self.paths.texts.column(Int32Array::from(std::mem::take(&mut self.program)))?,
-        ];
-        Ok(FEATURES.iter().map(|feature| feature.name).zip(columns).collect())
+    /// Forgets all rows, but not the texts.
+    pub(crate) fn clear(&mut self) {
+        [&mut self.state, &mut self.action, &mut self.timestamp, &mut self.gripper].into_iter().for_each(Vec::clear);
+        [&mut self.frame_index, &mut self.episode_index, &mut self.index, &mut self.task_index]
+            .into_iter()
+            .for_each(Vec::clear);
+        [&mut self.subtask_index, &mut self.recording_frame, &mut self.call_id].into_iter().for_each(Vec::clear);
+        [&mut self.done, &mut self.success, &mut self.boundary].into_iter().for_each(Vec::clear);
+        self.time_secs.clear();
+        self.program.clear();
     }
 }
 
@@ -241,16 +222,16 @@ fn subtask_text(view: &EpisodeView<'_>, position: usize) -> String {
 struct Paths {
     texts: TextTable,
     /// By the key of the caller's path, the keys of the paths of what it calls.
-    callees: Vec<[Option<i32>; Program::ALL.len()]>,
-    of_call: Vec<i32>,
+    callees: Vec<[Option<u32>; Program::ALL.len()]>,
+    of_call: Vec<u32>,
 }
 
 impl Paths {
-    fn root(&mut self, program: Program) -> i32 {
+    fn root(&mut self, program: Program) -> u32 {
         self.texts.key(program.name())
     }
 
-    fn callee(&mut self, caller: i32, program: Program) -> i32 {
+    fn callee(&mut self, caller: u32, program: Program) -> u32 {
         let caller = caller as usize;
         if self.callees.len() <= caller {
             self.callees.resize(caller + 1, [None; Program::ALL.len()]);
@@ -261,19 +242,4 @@ impl Paths {
             self.texts.key(&path)
         })
     }
-}
-
-fn int64(values: &mut Vec<i64>) -> ArrayRef {
-    Arc::new(Int64Array::from(std::mem::take(values)))
-}
-
-fn boolean(values: &mut Vec<bool>) -> ArrayRef {
-    Arc::new(BooleanArray::from(std::mem::take(values)))
-}
-
-fn vectors(values: &mut Vec<f32>, width: usize) -> Result<ArrayRef, ArrowError> {
-    let values = Float32Array::from(std::mem::take(values));
-    let element = Field::new("element", values.data_type().clone(), false);
-    debug_assert_eq!(values.data_type(), &DataType::Float32);
-    Ok(Arc::new(FixedSizeListArray::try_new(Arc::new(element), width as i32, Arc::new(values), None)?))
 }

@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use arrow::array::ArrayRef;
-
 use crate::dataset::layout::FilePlace;
-use crate::table::{TableError, TableSchema, TableWriter, WriteOptions};
+use crate::table::{TableError, TableSchema, TableWriter, Values, WriteOptions};
 
 /// Writes `FOLDER/chunk-000/file-000.parquet` and its successors.
 pub(crate) struct RollingTable {
@@ -37,13 +35,12 @@ impl RollingTable {
     }
 
     /// Writes one row group. When the file is then as large as it shall be, it is ended.
-    pub(crate) fn write_row_group(&mut self, columns: &[(&str, ArrayRef)]) -> Result<(), TableError> {
+    pub(crate) fn write_row_group(&mut self, columns: &[(&str, Values<'_>)]) -> Result<(), TableError> {
         let mut writer = match self.writer.take() {
             Some(writer) => writer,
             None => self.create()?,
         };
-        writer.write_named(columns)?;
-        writer.end_row_group()?;
+        writer.write_row_group(columns)?;
         if writer.bytes_written() < self.file_bytes {
             self.writer = Some(writer);
             return Ok(());

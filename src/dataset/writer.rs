@@ -19,7 +19,7 @@ use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES, SUB
 use crate::dataset::statistics::Statistics;
 use crate::dataset::text::TextTable;
 use crate::program::{Program, vocabulary_hash};
-use crate::table::{self, Column, TableWriter, WriteOptions};
+use crate::table::{TableSchema, TableWriter, Values, WriteOptions};
 use crate::task::Family;
 use crate::trace::Episode;
 
@@ -145,7 +145,7 @@ impl Tables {
             families: BTreeSet::new(),
             tasks: TextTable::default(),
             frames: FrameRows::new(n_slots),
-            calls: CallRows::default(),
+            calls: CallRows::new(),
             scopes: ScopeRows::default(),
             provenance: ProvenanceRows::default(),
             meta: MetaRows::default(),
@@ -179,10 +179,10 @@ impl Tables {
         let (episode_index, first_index) = (places.episode_index, places.first_index);
         let first_row = self.frames.n_rows();
         self.frames.append(view, EpisodeIds { episode_index, first_index, task_index, fps });
-        self.statistics.append(&self.frames.numbers(), first_row, view.n_rows())?;
+        self.statistics.append(&self.frames.columns(), &(first_row..self.frames.n_rows()));
         self.calls.append(view, episode_index);
         self.provenance.append(view, source, places);
-        self.meta.append(view, places);
+        self.meta.append(view, places, self.meta_files.place());
         self.n_episodes += 1;
         self.n_frames += view.n_rows() as u64;
         self.n_calls += view.episode.calls.len() as u64;
@@ -221,28 +221,35 @@ impl Tables {
         Ok(())
     }
 
-    #[inline(never)]
     fn write_frames(&mut self) -> Result<(), ConvertError> {
-        Ok(self.data_files.write_row_group(&self.frames.take()?)?)
+        let columns = self.frames.columns();
+        self.statistics.keep(&columns, self.frames.n_rows())?;
+        self.data_files.write_row_group(&columns)?;
+        self.frames.clear();
+        Ok(())
     }
 
-    #[inline(never)]
     fn write_calls(&mut self) -> Result<(), ConvertError> {
-        Ok(self.call_files.write_row_group(&self.calls.take()?)?)
+        self.call_files.write_row_group(&self.calls.columns())?;
+        self.calls.clear();
+        Ok(())
     }
 
-    #[inline(never)]
     fn write_scopes(&mut self) -> Result<(), ConvertError> {
-        Ok(self.scope_files.write_row_group(&self.scopes.take()?)?)
+        self.scope_files.write_row_group(&self.scopes.columns())?;
+        self.scopes.clear();
+        Ok(())
     }
 
     fn write_episodes(&mut self) -> Result<(), ConvertError> {
-        let statistics = self.statistics.take()?;
-        let mut columns: Vec<(&str, _)> = self.meta.take(self.meta_files.place())?;
-        columns.extend(statistics.iter().map(|(name, array)| (name.as_str(), std::sync::Arc::clone(array))));
+        let mut columns: Vec<(&str, Values<'_>)> = self.meta.columns().into();
+        columns.extend(self.statistics.columns());
         self.meta_files.write_row_group(&columns)?;
-        self.provenance_file.write_columns(self.provenance.take())?;
-        Ok(self.provenance_file.end_row_group()?)
+        self.provenance_file.write_row_group(&self.provenance.columns())?;
+        self.meta.clear();
+        self.statistics.clear();
+        self.provenance.clear();
+        Ok(())
     }
 
     fn finish(
@@ -331,15 +338,15 @@ fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), ConvertError> {
 fn write_texts(
     root: &Path,
     file: &str,
-    schema: table::TableSchema,
+    schema: TableSchema,
     [number, text]: [&'static str; 2],
     texts: &[String],
     pandas: String,
 ) -> Result<(), ConvertError> {
     let options = WriteOptions { metadata: vec![("pandas".to_owned(), pandas)], ..WriteOptions::default() };
     let mut writer = TableWriter::create(&root.join(file), &schema, options)?;
-    let numbers = Column::Int64((0..texts.len() as i64).collect());
-    writer.write_columns(vec![(number, numbers), (text, Column::Text(texts.to_vec()))])?;
+    let numbers: Vec<i64> = (0..texts.len() as i64).collect();
+    writer.write_row_group(&[(number, Values::Int64(&numbers)), (text, Values::Text(texts))])?;
     Ok(writer.commit()?)
 }
 

@@ -91,6 +91,20 @@ pub enum TableError {
 }
 
 impl TableError {
+    /// The file that it is about; `None` when it is about a schema of the program.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Io(error) => Some(error.path()),
+            Self::Schema { .. } => None,
+            Self::Parquet { path, .. }
+            | Self::MissingColumn { path, .. }
+            | Self::UnknownColumn { path, .. }
+            | Self::ColumnKind { path, .. }
+            | Self::RowCount { path, .. }
+            | Self::Null { path, .. } => Some(path),
+        }
+    }
+
     /// Names the file of an error of the Parquet crate.
     pub(crate) fn parquet(path: &Path) -> impl Fn(ParquetError) -> Self + use<> {
         let path = path.to_owned();

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
 use arrow::datatypes::{ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
@@ -35,7 +36,7 @@ pub struct TableReader {
     schema: &'static str,
     columns: Vec<(String, ColumnKind)>,
     reader: ParquetRecordBatchReader,
-    n_rows: u64,
+    footer: Arc<ParquetMetaData>,
     rows_read: u64,
 }
 
@@ -58,16 +59,27 @@ impl TableReader {
         let builder =
             ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
         let roots = find_roots(path, schema.name(), &columns, builder.metadata())?;
-        let n_rows = builder.metadata().file_metadata().num_rows().max(0) as u64;
+        let footer = Arc::clone(builder.metadata());
         let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
         let reader =
             builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(TableError::parquet(path))?;
-        Ok(Self { path: path.to_owned(), schema: schema.name(), columns, reader, n_rows, rows_read: 0 })
+        Ok(Self { path: path.to_owned(), schema: schema.name(), columns, reader, footer, rows_read: 0 })
     }
 
     /// Rows of the file, as its footer says.
     pub fn n_rows(&self) -> u64 {
-        self.n_rows
+        self.footer.file_metadata().num_rows().max(0) as u64
+    }
+
+    /// Names of all columns of the file, also of those that are not read.
+    pub fn file_columns(&self) -> impl Iterator<Item = &str> {
+        self.footer.file_metadata().schema().get_fields().iter().map(|field| field.name())
+    }
+
+    /// An entry of the file's key-value metadata.
+    pub fn metadata(&self, key: &str) -> Option<&str> {
+        let entries = self.footer.file_metadata().key_value_metadata()?;
+        entries.iter().find(|entry| entry.key == key)?.value.as_deref()
     }
 
     /// Where it is.

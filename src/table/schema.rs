@@ -8,7 +8,7 @@ use parquet::arrow::parquet_to_arrow_schema;
 use parquet::schema::parser::parse_message_type;
 use parquet::schema::types::SchemaDescriptor;
 
-use crate::table::{ColumnKind, Form, TableError};
+use crate::table::{ColumnKind, Form, TableError, Value};
 
 /// A table's contract: a name and the text of `schemas/parquet/NAME.message`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,11 +92,9 @@ impl ParsedSchema {
         Some((position, self.columns[position].1))
     }
 
-    /// Names of the columns of floats, in which a dictionary finds nothing to share.
-    pub(crate) fn float_lists(&self) -> impl Iterator<Item = &str> {
-        let is_float = |kind: &ColumnKind| {
-            kind.form == Form::List && matches!(kind.value, crate::table::Value::Float32 | crate::table::Value::Float64)
-        };
-        self.columns.iter().filter(move |(_, kind)| is_float(kind)).map(|(name, _)| name.as_str())
+    /// Whether a column holds lists of floats, in which a dictionary finds nothing to share.
+    pub(crate) fn is_float_list(&self, name: &str) -> bool {
+        let kind = self.find(name).map(|(_, kind)| kind);
+        kind.is_some_and(|kind| kind.form == Form::List && matches!(kind.value, Value::Float32 | Value::Float64))
     }
 }

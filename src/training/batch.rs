@@ -6,24 +6,18 @@
 //! a plain sum and the parts of a split mini-batch add up.
 
 use rand::Rng;
-use rand::seq::SliceRandom as _;
 
 use crate::model::Windows;
 use crate::program::Program;
-use crate::robot::{GRASP_M, HOVER_M};
-use crate::scene::SlotIndex;
 use crate::seed::Seed;
-use crate::task::Family;
 use crate::trace::{Observation, ScopingLabel};
+use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
 
 /// Frames in a mini-batch from which on it is split in two parts of about the same length of windows: less padding,
 /// and a part for each of two cores. A fixed number, since the sum of gradients must not depend on the machine.
 const SPLIT_FRAMES: usize = 192;
-
-/// How far a jittered gripper is moved, in x, y and z, in metres.
-const JITTER_M: [f32; 3] = [0.25, 0.25, 0.1];
 
 /// A part of a mini-batch, all of one running program.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,78 +102,15 @@ fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng:
     let data = examples.data();
     let width = Observation::width(data.n_slots);
     let rows = &data.trials[example.demonstration].observations;
-    let mut window = rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec();
-    let family = data.trials[example.trial].family;
-    let mut state = data.trials[example.trial].observations[example.frame * width..][..width].to_vec();
-    let mut argument = example.argument.map(|slot| usize::from(slot.0));
-    // The number of draws does not depend on the outcome of one: an augmentation switched off changes no other.
-    let (relabelled, jittered) = (rng.random::<f32>(), rng.random::<f32>());
-    let (permutation, place) = (permutation(family, data.n_slots, rng), Place::draw(data.n_slots, rng));
-    if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(&example, &state) {
-        place.put_gripper(&mut state, example.next_move);
-    }
-    if relabelled < config.relabel_slots.unwrap_or_default() {
-        window.chunks_exact_mut(width).for_each(|row| relabel(row, &permutation));
-        relabel(&mut state, &permutation);
-        argument = argument.and_then(|slot| permutation.iter().position(|&shown| shown == slot));
-    }
+    let mut views = Views {
+        n_slots: data.n_slots,
+        window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
+        state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
+        argument: example.argument.map(|slot| usize::from(slot.0)),
+    };
+    views.augment(data.trials[example.trial].family, config, &example, rng);
+    let Views { n_slots: _, window, state, argument } = views;
     Prepared { example, window, state, argument }
-}
-
-/// Which slot each label shows: any order of blocks; categories and containers among themselves.
-fn permutation(family: Family, n_slots: usize, rng: &mut impl Rng) -> Vec<usize> {
-    let mut slots: Vec<usize> = (0..n_slots).collect();
-    match family {
-        Family::BlockStacking => slots.shuffle(rng),
-        Family::ObjectSorting => slots.chunks_mut(n_slots.div_ceil(2).max(1)).for_each(|kind| kind.shuffle(rng)),
-    }
-    slots
-}
-
-fn relabel(row: &mut [f32], permutation: &[usize]) {
-    let shown = row.to_vec();
-    for (positions, &slot) in row.chunks_exact_mut(3).zip(permutation) {
-        positions.copy_from_slice(&shown[3 * slot..3 * slot + 3]);
-    }
-}
-
-/// Whether the decision stays right wherever the gripper is: it is empty, and the next primitive moves it (or none
-/// comes).
-fn may_jitter(example: &Example, state: &[f32]) -> bool {
-    let open = state[state.len() - 2] > 0.5;
-    open && (example.next_move.is_some() || example.last_decision)
-}
-
-/// Where a jittered gripper is put.
-enum Place {
-    /// So far from where it was.
-    Offset([f32; 3]),
-    /// So high above what a slot shows.
-    Above { slot: usize, height_m: f32 },
-}
-
-impl Place {
-    fn draw(n_slots: usize, rng: &mut impl Rng) -> Self {
-        if rng.random::<bool>() {
-            return Self::Offset(JITTER_M.map(|reach| rng.random_range(-reach..reach)));
-        }
-        let height_m = if rng.random::<bool>() { HOVER_M } else { GRASP_M };
-        Self::Above { slot: rng.random_range(0..n_slots), height_m }
-    }
-
-    /// Positions are relative to the gripper: moving it moves everything else. It is never put above what it shall
-    /// move to next, since there the move would be done.
-    fn put_gripper(&self, state: &mut [f32], next_move: Option<SlotIndex>) {
-        let offset = match *self {
-            Self::Offset(offset) => offset,
-            Self::Above { slot, .. } if next_move.is_some_and(|next| usize::from(next.0) == slot) => return,
-            Self::Above { slot, height_m } => [state[3 * slot], state[3 * slot + 1], state[3 * slot + 2] + height_m],
-        };
-        let n_coordinates = state.len() - 2;
-        for position in state[..n_coordinates].chunks_exact_mut(3) {
-            position.iter_mut().zip(offset).for_each(|(coordinate, offset)| *coordinate -= offset);
-        }
-    }
 }
 
 fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts: Counts) -> Part {

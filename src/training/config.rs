@@ -65,6 +65,9 @@ pub struct TrainConfig {
     /// expert's never did. By default 0.2 for object-centric networks and never for flattened ones, which it keeps
     /// from learning in this budget.
     pub gripper_jitter: Option<f32>,
+    /// How often slots that the running program has nothing to do with are put elsewhere, in the demonstration and
+    /// now (0 to 1): a program learns to look at its own slots alone. Off by default; Object Sorting needs it.
+    pub scatter_bystanders: f32,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -85,6 +88,7 @@ impl Default for TrainConfig {
             loss: LossWeights::default(),
             relabel_slots: None,
             gripper_jitter: None,
+            scatter_bystanders: 0.0,
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -152,6 +156,7 @@ impl TrainConfig {
             ("final_learning_rate", self.final_learning_rate),
             ("relabel_slots", self.relabel_slots.unwrap_or(0.0)),
             ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
+            ("scatter_bystanders", self.scatter_bystanders),
         ];
         let weights = [
             ("loss.program", loss.program),

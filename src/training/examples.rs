@@ -43,7 +43,9 @@ pub struct Example {
     pub argument: Option<SlotIndex>,
     /// What the next primitive is called with; `None` where it is not a `move_to`.
     pub next_move: Option<SlotIndex>,
-    /// Whether a primitive comes at all, at this decision or later.
+    /// Arguments of every move below the running program.
+    pub involved: Vec<SlotIndex>,
+    /// Whether no primitive comes any more, at this decision or later.
     pub last_decision: bool,
 }
 
@@ -146,7 +148,8 @@ impl<'d> Examples<'d> {
     pub fn example(&self, trial: usize, call: usize, demonstration: usize) -> Option<Example> {
         let calls = &self.data.trials[trial].calls;
         let decided = calls.get(call)?;
-        let caller = self.matching(trial, decided.caller?.0 as usize, demonstration)?;
+        let own_caller = decided.caller?.0 as usize;
+        let caller = self.matching(trial, own_caller, demonstration)?;
         let demonstrated = &self.data.trials[demonstration].calls;
         let window = demonstrated[caller].output?;
         let scope = if decided.program.is_composite() {
@@ -166,6 +169,7 @@ impl<'d> Examples<'d> {
             scope,
             argument: decided.argument,
             next_move: next.filter(|call| call.program == Program::MoveTo).and_then(|call| call.argument),
+            involved: moves_below(calls, own_caller),
             last_decision: next.is_none(),
         })
     }

@@ -5,14 +5,15 @@ use std::path::Path;
 
 use ntp::dataset::{
     ConvertConfig, ConvertError, ConvertSummary, FailedEpisodes, FrameChoice, RecordingEpisodes, TrialData, convert,
-    read_trials, schema,
+    read_trials, schema, summarize, validate,
 };
 use ntp::program::Program;
+use ntp::rollout::{Limits, Oracle, Start, run};
 use ntp::table::{self, Column, TableSchema};
 use ntp::task::{Split, Task};
-use ntp::trace::{Cause, Episode, EpisodeParts, Frame, Outcome, ProgramCall, ScopingLabel, Span};
+use ntp::trace::{Actor, Cause, Episode, EpisodeParts, Frame, Outcome, ProgramCall, Provenance, ScopingLabel, Span};
 
-use crate::kinematic::{demonstration, sorting, tower, trial};
+use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
 
 /// Six episodes of three tasks, two of them held out.
 pub(crate) fn episodes() -> Vec<Episode> {
@@ -248,18 +249,18 @@ fn scoping_labels_are_those_of_the_spans() {
     let episode = columns.int64("episode_index").unwrap();
     let call = columns.int64("call_id").unwrap();
     let frame = columns.int64("specification_frame").unwrap();
-    let label = columns.text("label").unwrap();
+    let label = columns.int64("label").unwrap();
     let (is_start, is_end) = (columns.boolean("is_start").unwrap(), columns.boolean("is_end").unwrap());
     let mut row = 0;
     for (episode_index, value) in episodes.iter().enumerate() {
         for of in value.calls.iter().filter(|call| call.program != Program::None) {
             let output = of.output.unwrap();
             for at in of.input.begin..of.input.end {
-                let found = (episode[row], call[row], frame[row], label[row].as_str(), is_start[row], is_end[row]);
-                let expected: ScopingLabel = output.label(at);
+                let found = (episode[row], call[row], frame[row], label[row], is_start[row], is_end[row]);
+                let expected = ScopingLabel::ALL.iter().position(|&label| label == output.label(at)).unwrap() as i64;
                 let (is_first, is_last) = (at == output.begin, at == output.last());
                 let ids = (episode_index as i64, i64::from(of.id.0), i64::from(at));
-                assert_eq!(found, (ids.0, ids.1, ids.2, expected.name(), is_first, is_last));
+                assert_eq!(found, (ids.0, ids.1, ids.2, expected, is_first, is_last));
                 row += 1;
             }
         }
@@ -469,4 +470,202 @@ fn a_dropped_column_is_named() {
         table::write(&path, &WITHOUT, named).unwrap();
     };
     fault(drop_columns, &[FIRST_DATA, r#"column "observation.state" is missing"#]);
+}
+
+/// An oracle's rollout of each task on a table of its own, the demonstration with frames between its boundaries.
+fn rollouts() -> Vec<Episode> {
+    let task = tower("stack_0", &[2, 5, 0], Split::Unseen);
+    let own_trial = trial(&task, 1, 1);
+    let start = Start {
+        task: &task,
+        demonstration: densify(&demonstration(&task, &trial(&task, 0, 1), 0), 4),
+        world: Box::new(KinematicWorld::new(task.family, &own_trial)),
+        provenance: Provenance::new(&task, &own_trial, Actor::Policy(String::new()), 0),
+    };
+    let starts = vec![start];
+    let mut oracle = Oracle::for_starts(&starts);
+    run(&mut oracle, starts, Limits::default()).unwrap().into_iter().map(|rollout| rollout.episode).collect()
+}
+
+#[test]
+fn a_rollout_keeps_its_spans_over_the_demonstration() {
+    let rollout = densify_frames_alone(&rollouts()[0], 2);
+    for frames in [FrameChoice::Boundaries, FrameChoice::All] {
+        let folder = tempfile::tempdir().unwrap();
+        convert_all(std::slice::from_ref(&rollout), &config(frames), folder.path()).unwrap();
+        let mut columns = table::read(&folder.path().join(FIRST_CALLS), &schema::CALLS).unwrap();
+        let input_end = columns.int64("input_end").unwrap();
+        let expected: Vec<i64> = rollout.calls.iter().map(|call| i64::from(call.input.end)).collect();
+        assert_eq!(input_end, expected);
+        let mut episodes = table::read(&folder.path().join("ntp/episodes.parquet"), &schema::EPISODES).unwrap();
+        assert_eq!(episodes.text("specification").unwrap(), ["demonstration"]);
+        assert_eq!(episodes.int64("specification_frames").unwrap(), [i64::from(rollout.specification_frames)]);
+        assert_eq!(validate(folder.path()).findings, []);
+        let error = read_trials(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("episode 0: it was acted by \"oracle\" on a demonstration"), "{error}");
+    }
+}
+
+/// As [`densify`], but the specification stays as it is.
+fn densify_frames_alone(rollout: &Episode, n_between: u32) -> Episode {
+    let original = rollout.clone().into_parts();
+    let mut as_own = original.clone();
+    as_own.specification_frames = as_own.frames.len() as u32;
+    for call in &mut as_own.calls {
+        call.input = Span { begin: 0, end: 1 };
+        call.output = call.output.map(|_| Span { begin: 0, end: 1 });
+    }
+    let mut parts = densify(&Episode::new(as_own).unwrap(), n_between).into_parts();
+    parts.specification_frames = original.specification_frames;
+    for (call, before) in parts.calls.iter_mut().zip(original.calls) {
+        (call.input, call.output) = (before.input, before.output);
+    }
+    Episode::new(parts).unwrap()
+}
+
+#[test]
+fn whatever_is_converted_is_valid() {
+    let dense: Vec<Episode> = episodes().iter().map(|episode| densify(episode, 3)).collect();
+    let mut with_failure = episodes();
+    with_failure[2] = failed(&with_failure[2]);
+    let include = ConvertConfig { failed: FailedEpisodes::Include, ..ConvertConfig::default() };
+    let cases = [
+        (episodes(), ConvertConfig::default()),
+        (sorting_episodes(), ConvertConfig::default()),
+        (dense.clone(), ConvertConfig::default()),
+        (dense, config(FrameChoice::All)),
+        (with_failure, include),
+        ([episodes(), sorting_episodes()].concat(), ConvertConfig::default()),
+    ];
+    for (episodes, config) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let summary = convert_all(&episodes, &config, folder.path()).unwrap();
+        let validation = validate(folder.path());
+        assert_eq!(validation.findings, []);
+        let checked = (validation.episodes, validation.frames, validation.calls, validation.scopes);
+        assert_eq!(checked, (summary.episodes, summary.frames, summary.calls, summary.scopes));
+    }
+}
+
+#[test]
+fn a_summary_counts_episodes_by_split_actor_and_outcome() {
+    let folder = tempfile::tempdir().unwrap();
+    convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+    let summary = summarize(folder.path()).unwrap();
+    assert_eq!((summary.total_episodes, summary.total_tasks), (6, 3));
+    assert_eq!(summary.splits["seen"], 2);
+    assert_eq!(summary.actors["expert"], 6);
+    assert_eq!(summary.outcomes["success"], 6);
+    assert_eq!(summary.episode_frames, [5, 13]);
+}
+
+/// Spoils a dataset and holds the first finding's code, file and a part of its message.
+#[track_caller]
+fn finding(make: impl FnOnce(&Path), code: &str, file: &str, message: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+    make(folder.path());
+    let validation = validate(folder.path());
+    assert!(!validation.is_valid());
+    let first = &validation.findings[0];
+    assert_eq!((first.code, first.path.as_path()), (code, folder.path().join(file).as_path()), "{first:?}");
+    assert!(first.message.contains(message), "{first:?} does not contain {message:?}");
+}
+
+/// Changes one value of one column.
+fn spoil(file: &'static str, schema: TableSchema, column: &'static str, row: usize) -> impl FnOnce(&Path) {
+    move |root| {
+        rewrite(root, file, &schema, |columns| {
+            match columns.iter_mut().find(|(name, _)| name == column).map(|(_, column)| column) {
+                Some(Column::Int64(rows)) => rows[row] += 1,
+                Some(Column::Float32(rows)) => rows[row] += 0.5,
+                Some(Column::Float64(rows)) => rows[row] -= 100.0,
+                Some(Column::Boolean(rows)) => rows[row] = !rows[row],
+                Some(Column::Text(rows)) => rows[row] = "other".to_owned(),
+                Some(Column::OptionalText(rows)) => rows[row] = Some("other".to_owned()),
+                Some(Column::Float32List(rows)) => rows[row].iter_mut().for_each(|value| *value += 0.5),
+                other => panic!("{other:?}"),
+            }
+        });
+    }
+}
+
+#[test]
+fn every_wrong_value_has_a_finding_of_its_own_code() {
+    let frames = |column, row| spoil(FIRST_DATA, schema::FRAMES, column, row);
+    finding(frames("index", 3), "frames.row", FIRST_DATA, "index is 4, but should be 3");
+    finding(frames("timestamp", 3), "frames.time", FIRST_DATA, "timestamp");
+    finding(frames("ntp.time_secs", 3), "frames.time", FIRST_DATA, "ntp.time_secs");
+    finding(frames("action", 3), "frames.action", FIRST_DATA, "the action of the row before");
+    finding(frames("action", 8), "frames.action", FIRST_DATA, "the last action");
+    finding(frames("observation.state", 3), "frames.state", FIRST_DATA, "(open, closed)");
+    finding(frames("ntp.call_id", 3), "frames.label", FIRST_DATA, "but the calls make them");
+    finding(frames("ntp.program", 3), "frames.label", FIRST_DATA, "other");
+    finding(frames("task_index", 3), "frames.task", FIRST_DATA, "put block_D on block_B");
+    finding(frames("next.done", 3), "frames.done", FIRST_DATA, "next.done");
+    let calls = |column, row| spoil(FIRST_CALLS, schema::CALLS, column, row);
+    finding(calls("depth", 3), "calls.tree", FIRST_CALLS, "its depth is");
+    finding(calls("argument", 3), "calls.argument", FIRST_CALLS, "other");
+    finding(calls("program", 3), "calls.row", FIRST_CALLS, "unknown program");
+    let scopes = |column, row| spoil(FIRST_SCOPES, schema::SCOPES, column, row);
+    finding(scopes("label", 3), "scopes.label", FIRST_SCOPES, "but the span makes them");
+    finding(scopes("call_id", 3), "scopes.row", FIRST_SCOPES, "should be (0, 0, 3)");
+    let episodes = |column, row| spoil("ntp/episodes.parquet", schema::EPISODES, column, row);
+    finding(episodes("split", 3), "episodes.value", "ntp/episodes.parquet", "unknown split");
+    finding(episodes("success", 3), "episodes.value", "ntp/episodes.parquet", "do not go together");
+    finding(episodes("n_scopes", 5), "scopes.row", FIRST_SCOPES, "n_scopes");
+}
+
+#[test]
+fn a_task_in_two_splits_is_a_leak() {
+    let relabel = |root: &Path| {
+        rewrite(root, "ntp/episodes.parquet", &schema::EPISODES, |columns| {
+            let Some((_, Column::Text(splits))) = columns.iter_mut().find(|(name, _)| name == "split") else {
+                panic!("no split")
+            };
+            splits[3] = "seen".to_owned();
+        });
+    };
+    finding(relabel, "split.leak", "ntp/episodes.parquet", "is seen here and unseen before");
+}
+
+#[test]
+fn faults_of_whole_files_are_found() {
+    let remove = |file: &'static str| move |root: &Path| std::fs::remove_file(root.join(file)).unwrap();
+    finding(remove(FIRST_DATA), "file.unreadable", FIRST_DATA, "");
+    finding(remove("meta/stats.json"), "file.unreadable", "meta/stats.json", "");
+    finding(remove("meta/info.json"), "file.unreadable", "meta/info.json", "");
+    finding(remove("ntp/info.json"), "file.unreadable", "ntp/info.json", "");
+    let stray = |root: &Path| {
+        std::fs::copy(root.join(FIRST_DATA), root.join("data/chunk-000/file-001.parquet")).unwrap();
+    };
+    finding(stray, "file.unlisted", "data/chunk-000/file-001.parquet", "no episode is in this file");
+    let plain_tasks = |root: &Path| rewrite(root, "meta/tasks.parquet", &schema::TASKS, |_| ());
+    finding(plain_tasks, "tasks.index", "meta/tasks.parquet", "row numbers");
+    let swap = |root: &Path| {
+        rewrite(root, "meta/tasks.parquet", &schema::TASKS, |columns| int64(columns, "task_index").swap(0, 1));
+    };
+    finding(swap, "meta.row", "meta/tasks.parquet", "task_index is 1, but should be 0");
+    let edit = |file: &'static str, from: &'static str, to: &'static str| {
+        move |root: &Path| {
+            let text = std::fs::read_to_string(root.join(file)).unwrap();
+            assert!(text.contains(from));
+            std::fs::write(root.join(file), text.replacen(from, to, 1)).unwrap();
+        }
+    };
+    finding(edit("meta/info.json", "v3.0", "v2.1"), "info.value", "meta/info.json", "v2.1");
+    finding(edit("meta/info.json", "ntp.program", "ntp.other"), "info.value", "meta/info.json", "is not declared");
+    finding(edit("meta/stats.json", "\"action\"", "\"other\""), "stats.value", "meta/stats.json", "no statistics");
+}
+
+#[test]
+fn findings_beyond_the_first_hundred_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+    rewrite(folder.path(), FIRST_SCOPES, &schema::SCOPES, |columns| {
+        int64(columns, "label").iter_mut().for_each(|label| *label += 1);
+    });
+    let validation = validate(folder.path());
+    assert_eq!(validation.findings.len(), 100);
+    assert_eq!(validation.findings.len() as u64 + validation.findings_left_out, validation.scopes);
 }

@@ -25,6 +25,8 @@ mod rollout;
 #[cfg(test)]
 mod schemas;
 #[cfg(test)]
+mod schemas_parquet;
+#[cfg(test)]
 mod sim;
 #[cfg(test)]
 mod study;

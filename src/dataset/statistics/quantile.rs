@@ -9,27 +9,27 @@
 //! Memory is 16 kB for each wanted key at most, whatever the number of values.
 
 use crate::dataset::feature::Dtype;
-use crate::dataset::statistics::key::value_of;
+use crate::dataset::statistics::number::value_of;
 
 const DIGIT_BITS: u32 = 11;
 const N_DIGITS: usize = 1 << DIGIT_BITS;
 
 /// Between which two of the sorted values a quantile lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
-    pub(super) below: u64,
-    pub(super) above: u64,
+struct Place {
+    below: u64,
+    above: u64,
     share: f64,
 }
 
 impl Place {
-    pub(super) fn new(share: f64, count: u64) -> Self {
+    fn new(share: f64, count: u64) -> Self {
         let position = share * count.saturating_sub(1) as f64;
         let below = position.floor() as u64;
         Self { below, above: position.ceil() as u64, share: position - below as f64 }
     }
 
-    pub(super) fn interpolate(&self, below: f64, above: f64) -> f64 {
+    fn interpolate(&self, below: f64, above: f64) -> f64 {
         below + (above - below) * self.share
     }
 }
@@ -47,11 +47,14 @@ struct Wanted {
 pub(super) struct Selector {
     dtype: Dtype,
     min_key: u64,
+    n_digits: u32,
     digits_left: u32,
     places: Vec<Place>,
     wanted: Vec<Wanted>,
     /// By prefix, in growing order.
-    counts: Vec<(u64, Vec<u64>)>,
+    counts: Vec<(u64, Box<[u64; N_DIGITS]>)>,
+    /// Whether a wanted key may begin with a digit: most keys are seen at once to begin otherwise.
+    may_begin_with: Box<[bool; N_DIGITS]>,
 }
 
 impl Selector {
@@ -63,10 +66,16 @@ impl Selector {
         ranks.sort_unstable();
         ranks.dedup();
         let wanted = ranks.into_iter().map(|rank| Wanted { rank, prefix: 0, n_smaller: 0 }).collect();
-        let digits_left = bits.div_ceil(DIGIT_BITS);
-        let mut selector = Self { dtype, min_key, digits_left, places, wanted, counts: Vec::new() };
+        let n_digits = bits.div_ceil(DIGIT_BITS);
+        let (counts, may_begin_with) = (Vec::new(), Box::new([true; N_DIGITS]));
+        let mut selector =
+            Self { dtype, min_key, n_digits, digits_left: n_digits, places, wanted, counts, may_begin_with };
         selector.begin_pass();
         selector
+    }
+
+    pub(super) fn dtype(&self) -> Dtype {
+        self.dtype
     }
 
     pub(super) fn is_done(&self) -> bool {
@@ -80,20 +89,28 @@ impl Selector {
         }
         for wanted in &self.wanted {
             if self.counts.last().is_none_or(|(prefix, _)| *prefix != wanted.prefix) {
-                self.counts.push((wanted.prefix, vec![0; N_DIGITS]));
+                self.counts.push((wanted.prefix, Box::new([0; N_DIGITS])));
             }
         }
     }
 
-    /// Counts some keys, which are sorted.
-    pub(super) fn count(&mut self, sorted_keys: &[u64]) {
-        let low_bits = DIGIT_BITS * (self.digits_left - 1);
-        let number = |key: &u64| (key - self.min_key) >> low_bits;
-        for (prefix, counts) in &mut self.counts {
-            let (first, last) = (*prefix << DIGIT_BITS, (*prefix << DIGIT_BITS) + N_DIGITS as u64);
-            let begin = sorted_keys.partition_point(|key| number(key) < first);
-            for number in sorted_keys[begin..].iter().map(number).take_while(|number| *number < last) {
-                counts[(number - first) as usize] += 1;
+    /// Counts some keys.
+    pub(super) fn count(&mut self, keys: &[u64]) {
+        let first_shift = DIGIT_BITS * (self.n_digits - 1);
+        let shift = DIGIT_BITS * (self.digits_left - 1);
+        let digit = |number: u64, shift: u32| (number >> shift) as usize % N_DIGITS;
+        if let [(_, counts)] = &mut self.counts[..]
+            && self.digits_left == self.n_digits
+        {
+            keys.iter().for_each(|key| counts[digit(key - self.min_key, shift)] += 1);
+            return;
+        }
+        for number in keys.iter().map(|key| key - self.min_key) {
+            if self.may_begin_with[digit(number, first_shift)] {
+                let prefix = number >> shift >> DIGIT_BITS;
+                if let Some((_, counts)) = self.counts.iter_mut().find(|(known, _)| *known == prefix) {
+                    counts[digit(number, shift)] += 1;
+                }
             }
         }
     }
@@ -107,6 +124,10 @@ impl Selector {
                 digit += 1;
             }
             wanted.prefix = (wanted.prefix << DIGIT_BITS) | digit as u64;
+        }
+        if self.digits_left == self.n_digits {
+            self.may_begin_with.fill(false);
+            self.wanted.iter().for_each(|wanted| self.may_begin_with[wanted.prefix as usize % N_DIGITS] = true);
         }
         self.digits_left -= 1;
         self.begin_pass();
@@ -127,30 +148,24 @@ impl Selector {
 mod tests {
     use proptest::prelude::{Strategy as _, any, prop_assert_eq, proptest};
 
-    use super::super::key::{Numbers, value_of};
-    use super::{Dtype, Place, Selector};
+    use super::super::number::key_of;
+    use super::{Dtype, Place, Selector, value_of};
 
     const SHARES: [f64; 4] = [0.0, 0.1, 0.5, 1.0];
 
-    fn selected(dtype: Dtype, numbers: Numbers<'_>) -> Vec<f64> {
-        let (mut values, mut keys) = (Vec::new(), Vec::new());
-        numbers.copy_dimension(0, (0, 1), &mut values, &mut keys);
-        let chunks = keys.chunks_mut(7).map(|chunk| {
-            chunk.sort_unstable();
-            chunk.to_vec()
-        });
-        let chunks: Vec<Vec<u64>> = chunks.collect();
-        keys.sort_unstable();
-        let mut selector = Selector::new(dtype, (keys[0], keys[keys.len() - 1]), keys.len() as u64, &SHARES);
+    fn selected(dtype: Dtype, values: &[f64]) -> Vec<f64> {
+        let keys: Vec<u64> = values.iter().map(|&value| key_of(dtype, value)).collect();
+        let ends = (*keys.iter().min().unwrap(), *keys.iter().max().unwrap());
+        let mut selector = Selector::new(dtype, ends, keys.len() as u64, &SHARES);
         while !selector.is_done() {
-            chunks.iter().for_each(|chunk| selector.count(chunk));
+            keys.chunks(7).for_each(|keys| selector.count(keys));
             selector.end_pass();
         }
         (0..SHARES.len()).map(|position| selector.quantile(position)).collect()
     }
 
-    fn by_sorting(values: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut sorted: Vec<f64> = values.map(|value| value + 0.0).collect();
+    fn by_sorting(values: &[f64]) -> Vec<f64> {
+        let mut sorted: Vec<f64> = values.iter().map(|value| value + 0.0).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let quantile = |&share: &f64| {
             let place = Place::new(share, sorted.len() as u64);
@@ -167,29 +182,27 @@ mod tests {
             whole in proptest::collection::vec(-1_000_000_i64..1_000_000, 1..100),
             flags in proptest::collection::vec(any::<bool>(), 1..50),
         ) {
-            let expected = by_sorting(floats.iter().copied().map(f64::from));
-            prop_assert_eq!(selected(Dtype::Float32, Numbers::Float32(&floats)), expected);
-            let expected = by_sorting(doubles.iter().copied());
-            prop_assert_eq!(selected(Dtype::Float64, Numbers::Float64(&doubles)), expected);
-            let expected = by_sorting(whole.iter().map(|&value| value as f64));
-            prop_assert_eq!(selected(Dtype::Int64, Numbers::Int64(&whole)), expected);
-            let expected = by_sorting(flags.iter().map(|&flag| f64::from(u8::from(flag))));
-            prop_assert_eq!(selected(Dtype::Bool, Numbers::Boolean(&flags)), expected);
+            let floats: Vec<f64> = floats.into_iter().map(f64::from).collect();
+            prop_assert_eq!(selected(Dtype::Float32, &floats), by_sorting(&floats));
+            prop_assert_eq!(selected(Dtype::Float64, &doubles), by_sorting(&doubles));
+            let whole: Vec<f64> = whole.into_iter().map(|value| value as f64).collect();
+            prop_assert_eq!(selected(Dtype::Int64, &whole), by_sorting(&whole));
+            let flags: Vec<f64> = flags.into_iter().map(|flag| f64::from(u8::from(flag))).collect();
+            prop_assert_eq!(selected(Dtype::Bool, &flags), by_sorting(&flags));
         }
 
         #[test]
         fn keys_have_the_order_of_their_values(a in any::<f32>(), b in any::<f32>()) {
-            let (mut values, mut keys) = (Vec::new(), Vec::new());
-            Numbers::Float32(&[a, b]).copy_dimension(0, (0, 1), &mut values, &mut keys);
+            let [key_a, key_b] = [a, b].map(|value| key_of(Dtype::Float32, f64::from(value)));
             if !a.is_nan() && !b.is_nan() {
-                prop_assert_eq!(Some(keys[0].cmp(&keys[1])), a.partial_cmp(&b));
-                prop_assert_eq!(value_of(Dtype::Float32, keys[0]), f64::from(a));
+                prop_assert_eq!(Some(key_a.cmp(&key_b)), a.partial_cmp(&b));
+                prop_assert_eq!(value_of(Dtype::Float32, key_a), f64::from(a));
             }
         }
     }
 
     #[test]
     fn quantiles_of_one_two_three_four_are_interpolated() {
-        assert_eq!(selected(Dtype::Float32, Numbers::Float32(&[4.0, 1.0, 3.0, 2.0])), [1.0, 1.3, 2.5, 4.0]);
+        assert_eq!(selected(Dtype::Float32, &[4.0, 1.0, 3.0, 2.0]), [1.0, 1.3, 2.5, 4.0]);
     }
 }

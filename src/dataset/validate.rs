@@ -1,0 +1,140 @@
+//! Checks every cross-reference of a dataset, in memory that does not grow with it.
+//!
+//! All tables are read side by side, episode by episode. What breaks one table off (rows out of order, a file that is
+//! missing) ends the check of that table; the others go on.
+
+mod episode;
+mod frames;
+mod meta;
+mod scopes;
+
+use std::path::Path;
+
+use crate::dataset::call_rows::{CallBatch, read_calls};
+use crate::dataset::cursor::Cursor;
+use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::finding::Validation;
+use crate::dataset::read::{check_tree, n_slots};
+use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
+use crate::dataset::{DatasetError, layout};
+use crate::trace::ProgramCall;
+
+use episode::{ArgumentBatch, EpisodeCheck};
+use frames::{FrameCheck, FullFrameBatch};
+use meta::Texts;
+use scopes::ScopeBatch;
+
+/// Checks a dataset.
+///
+/// Holds the counts and the order of all rows, the rules of the program tree, labels against spans, actions against
+/// positions, task texts, the declared features, the presence and range of statistics, and that no task is in two
+/// splits. It reads no recordings.
+pub fn validate(root: &Path) -> Validation {
+    let mut validation = Validation::default();
+    let texts = meta::check(root, &mut validation);
+    if let Err(error) = check_episodes(root, &texts, &mut validation) {
+        validation.failed("episodes.row", &error);
+    }
+    validation
+}
+
+/// The tables that are read side by side; `None` once a table could not be read on.
+struct Tables {
+    frames: Option<Cursor<FullFrameBatch>>,
+    calls: Option<Cursor<CallBatch>>,
+    arguments: Option<Cursor<ArgumentBatch>>,
+    scopes: Option<Cursor<ScopeBatch>>,
+}
+
+fn check_episodes(root: &Path, texts: &Texts, validation: &mut Validation) -> Result<(), DatasetError> {
+    let (info, mut rows) = EpisodeRows::open(root)?;
+    let n_slots = n_slots(root, &info)?;
+    let mut tables = Tables {
+        frames: Some(Cursor::new(root, layout::DATA, FRAMES)),
+        calls: Some(Cursor::new(root, layout::CALLS, CALLS)),
+        arguments: Some(Cursor::new(root, layout::CALLS, CALLS)),
+        scopes: Some(Cursor::new(root, layout::SCOPES, SCOPES)),
+    };
+    let mut episode_check = EpisodeCheck::default();
+    let mut frame_check = FrameCheck::new(n_slots, info.fps);
+    let mut calls = Vec::new();
+    while let Some(row) = rows.next() {
+        let row = row?;
+        validation.episodes += 1;
+        episode_check.check(rows.path(), &row, n_slots, validation);
+        let calls_are_there = tables.check_calls(&row, n_slots, &mut calls, validation);
+        tables.check_frames(&mut frame_check, &row, calls_are_there.then_some(&calls), texts, validation);
+        tables.check_scopes(&row, calls_are_there.then_some(&calls), validation);
+    }
+    tables.finish(validation);
+    meta::check_files(root, episode_check.data_places(), validation);
+    frame_check.compare_ranges(root, texts, validation);
+    Ok(())
+}
+
+impl Tables {
+    /// Reads and checks the calls of an episode; false when they are not there.
+    fn check_calls(
+        &mut self,
+        row: &EpisodeRow,
+        n_slots: usize,
+        calls: &mut Vec<ProgramCall>,
+        validation: &mut Validation,
+    ) -> bool {
+        let Some(cursor) = &mut self.calls else { return false };
+        if let Err(error) = read_calls(cursor, row, calls) {
+            validation.failed("calls.row", &error);
+            self.calls = None;
+            return false;
+        }
+        validation.calls += calls.len() as u64;
+        if let Err((call, problem)) = check_tree(row, n_slots, calls) {
+            let place = format!("episode {}, call {call}", row.episode_index);
+            validation.error("calls.tree", &cursor.path(), place, problem);
+        }
+        if let Some(arguments) = &mut self.arguments
+            && let Err(error) = episode::check_arguments(arguments, row, calls, validation)
+        {
+            validation.failed("calls.row", &error);
+            self.arguments = None;
+        }
+        true
+    }
+
+    fn check_frames(
+        &mut self,
+        check: &mut FrameCheck,
+        row: &EpisodeRow,
+        calls: Option<&Vec<ProgramCall>>,
+        texts: &Texts,
+        validation: &mut Validation,
+    ) {
+        let Some(cursor) = &mut self.frames else { return };
+        if let Err(error) = check.check(cursor, row, calls.map(Vec::as_slice), texts, validation) {
+            validation.failed("frames.row", &error);
+            self.frames = None;
+        }
+    }
+
+    fn check_scopes(&mut self, row: &EpisodeRow, calls: Option<&Vec<ProgramCall>>, validation: &mut Validation) {
+        let (Some(cursor), Some(calls)) = (&mut self.scopes, calls) else { return };
+        if let Err(error) = scopes::check(cursor, row, calls, validation) {
+            validation.failed("scopes.row", &error);
+            self.scopes = None;
+        }
+    }
+
+    /// Makes sure that nothing is left of the tables that were read to their end.
+    fn finish(&self, validation: &mut Validation) {
+        let ends = [
+            ("frames.row", self.frames.as_ref().map(Cursor::finish)),
+            ("calls.row", self.calls.as_ref().map(Cursor::finish)),
+            ("scopes.row", self.scopes.as_ref().filter(|_| self.calls.is_some()).map(Cursor::finish)),
+        ];
+        for (code, end) in ends {
+            if let Some(Err(error)) = end {
+                validation.failed(code, &error);
+            }
+        }
+    }
+}

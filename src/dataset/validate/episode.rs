@@ -1,0 +1,124 @@
+//! An episode's row on its own, the split over all episodes, and the names of arguments.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::dataset::DatasetError;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::finding::Validation;
+use crate::dataset::layout::FilePlace;
+use crate::table::{Columns, TableError};
+use crate::task::{Family, Split};
+use crate::trace::{Cause, ProgramCall};
+
+/// What the episodes so far said of their tasks.
+#[derive(Default)]
+pub(super) struct EpisodeCheck {
+    /// By task id: split and text.
+    tasks: BTreeMap<String, (String, String)>,
+    /// By task text: split.
+    splits: BTreeMap<String, String>,
+    data_places: BTreeSet<FilePlace>,
+}
+
+impl EpisodeCheck {
+    /// The files of frames that episodes name.
+    pub(super) fn data_places(&self) -> &BTreeSet<FilePlace> {
+        &self.data_places
+    }
+
+    pub(super) fn check(&mut self, path: &Path, row: &EpisodeRow, n_slots: usize, validation: &mut Validation) {
+        let place = || format!("episode {}", row.episode_index);
+        for problem in problems_of(row, n_slots) {
+            validation.error("episodes.value", path, place(), problem);
+        }
+        let is_hash =
+            row.recording_sha256.len() == 64 && row.recording_sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
+        if !is_hash {
+            let message =
+                format!("recording_sha256 is {:?}: the recording cannot be found again", row.recording_sha256);
+            validation.warn("episodes.recording", path, place(), message);
+        }
+        for problem in self.leaks(row) {
+            validation.error("split.leak", path, place(), problem);
+        }
+        self.data_places.insert(row.data);
+    }
+
+    fn leaks(&mut self, row: &EpisodeRow) -> Vec<String> {
+        let mut leaks = Vec::new();
+        let entry = self.tasks.entry(row.task_id.clone());
+        let (split, text) = entry.or_insert_with(|| (row.split.clone(), row.task_text.clone()));
+        if *split != row.split {
+            leaks.push(format!("task {:?} is {} here and {split} before", row.task_id, row.split));
+        }
+        if *text != row.task_text {
+            leaks.push(format!("task {:?} is {:?} here and {text:?} before", row.task_id, row.task_text));
+        }
+        let split = self.splits.entry(row.task_text.clone()).or_insert_with(|| row.split.clone());
+        if *split != row.split && leaks.is_empty() {
+            leaks.push(format!("the task {:?} is {} here and {split} before", row.task_text, row.split));
+        }
+        leaks
+    }
+}
+
+fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
+    let mut problems = Vec::new();
+    problems.extend(row.family.parse::<Family>().err().map(|error| error.to_string()));
+    problems.extend(row.split.parse::<Split>().err().map(|error| error.to_string()));
+    if !["episode", "demonstration"].contains(&row.specification.as_str()) {
+        problems.push(format!("specification is {:?}; allowed: episode, demonstration", row.specification));
+    }
+    if row.specification == "episode" && row.specification_frames != row.n_frames {
+        let (found, expected) = (row.specification_frames, row.n_frames);
+        problems.push(format!("specification_frames is {found}, but the episode is its own and has {expected}"));
+    }
+    if row.slots.len() != n_slots {
+        problems.push(format!("it names {} slots, but observations have {n_slots}", row.slots.len()));
+    }
+    let cause = row.cause.as_deref();
+    let outcome = cause.unwrap_or("success");
+    if row.is_success != cause.is_none() || row.outcome != outcome {
+        let (success, found) = (row.is_success, &row.outcome);
+        problems.push(format!("success {success}, outcome {found:?} and cause {cause:?} do not go together"));
+    }
+    if let Some(unknown) = cause.filter(|cause| Cause::from_name(cause).is_none()) {
+        problems.push(format!("unknown cause {unknown:?}; causes are {}", Cause::ALL.map(Cause::name).join(", ")));
+    }
+    problems
+}
+
+/// The names of arguments in `ntp/calls/`.
+pub(super) struct ArgumentBatch {
+    argument: Vec<Option<String>>,
+}
+
+impl Batch for ArgumentBatch {
+    const COLUMNS: &'static [&'static str] = &["argument"];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self { argument: columns.optional_text("argument")? })
+    }
+}
+
+/// Holds the names against the episode's slots.
+pub(super) fn check_arguments(
+    cursor: &mut Cursor<ArgumentBatch>,
+    row: &EpisodeRow,
+    calls: &[ProgramCall],
+    validation: &mut Validation,
+) -> Result<(), DatasetError> {
+    for call in calls {
+        let (batch, at) = cursor.next(row.calls)?;
+        let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0)));
+        let found = batch.argument[at].as_ref();
+        if found != expected {
+            let message = format!("argument is {found:?}, but its slot is named {expected:?}");
+            let place = format!("episode {}, call {}", row.episode_index, call.id.0);
+            validation.error("calls.argument", &cursor.path(), place, message);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,237 @@
+//! The frames of an episode: index columns, times, actions, and labels against the calls.
+
+use std::path::Path;
+
+use crate::dataset::DatasetError;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::feature::ACTION_NAMES;
+use crate::dataset::finding::Validation;
+use crate::dataset::frame_rows::FrameBatch;
+use crate::dataset::layout;
+use crate::dataset::validate::meta::Texts;
+use crate::table::{Columns, TableError};
+use crate::trace::{Observation, ProgramCall};
+
+/// Every column of `data/`.
+pub(super) struct FullFrameBatch {
+    base: FrameBatch,
+    action: Vec<Vec<f32>>,
+    timestamp: Vec<f32>,
+    task_index: Vec<i64>,
+    subtask_index: Vec<i64>,
+    done: Vec<bool>,
+    success: Vec<bool>,
+    time_secs: Vec<f64>,
+    recording_frame: Vec<i64>,
+    gripper: Vec<Vec<f32>>,
+    call_id: Vec<i64>,
+    program: Vec<String>,
+}
+
+impl Batch for FullFrameBatch {
+    const COLUMNS: &'static [&'static str] = &[
+        "observation.state",
+        "frame_index",
+        "episode_index",
+        "index",
+        "ntp.boundary",
+        "action",
+        "timestamp",
+        "task_index",
+        "subtask_index",
+        "next.done",
+        "next.success",
+        "ntp.time_secs",
+        "ntp.recording_frame",
+        "ntp.gripper_in_world_m",
+        "ntp.call_id",
+        "ntp.program",
+    ];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            base: FrameBatch::take(columns)?,
+            action: columns.float32_list("action")?,
+            timestamp: columns.float32("timestamp")?,
+            task_index: columns.int64("task_index")?,
+            subtask_index: columns.int64("subtask_index")?,
+            done: columns.boolean("next.done")?,
+            success: columns.boolean("next.success")?,
+            time_secs: columns.float64("ntp.time_secs")?,
+            recording_frame: columns.int64("ntp.recording_frame")?,
+            gripper: columns.float32_list("ntp.gripper_in_world_m")?,
+            call_id: columns.int64("ntp.call_id")?,
+            program: columns.text("ntp.program")?,
+        })
+    }
+}
+
+/// What the row before said that the next one must fit.
+struct Before {
+    action: Vec<f32>,
+    gripper: Vec<f32>,
+    time_secs: f64,
+    recording_frame: i64,
+}
+
+/// Checks the frames of one episode after another.
+pub(super) struct FrameCheck {
+    width: usize,
+    fps: u32,
+    /// Smallest and largest of each dimension of `observation.state`.
+    range: Vec<(f32, f32)>,
+}
+
+impl FrameCheck {
+    pub(super) fn new(n_slots: usize, fps: u32) -> Self {
+        let width = Observation::width(n_slots);
+        Self { width, fps: fps.max(1), range: vec![(f32::INFINITY, f32::NEG_INFINITY); width] }
+    }
+
+    /// Checks the frames of an episode. Labels are checked when its calls are there.
+    pub(super) fn check(
+        &mut self,
+        cursor: &mut Cursor<FullFrameBatch>,
+        row: &EpisodeRow,
+        calls: Option<&[ProgramCall]>,
+        texts: &Texts,
+        validation: &mut Validation,
+    ) -> Result<(), DatasetError> {
+        let labels = calls.map(|calls| labels(calls, row.n_frames));
+        let mut before: Option<Before> = None;
+        for frame in 0..row.n_frames {
+            let (batch, at) = cursor.next(row.data)?;
+            if let Some(problem) = batch.base.problem(at, row, frame, self.width) {
+                return Err(cursor.problem(problem));
+            }
+            validation.frames += 1;
+            self.widen(&batch.base.state[at]);
+            let mut problems = self.row_problems(batch, at, row, frame, texts);
+            problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
+            let label = labels.as_ref().and_then(|labels| labels.get(frame as usize));
+            problems.extend(label.and_then(|label| label_problem(label, batch, at)));
+            before = Some(Before {
+                action: batch.action[at].clone(),
+                gripper: batch.gripper[at].clone(),
+                time_secs: batch.time_secs[at],
+                recording_frame: batch.recording_frame[at],
+            });
+            for (code, problem) in problems {
+                let place = format!("episode {}, frame {frame}", row.episode_index);
+                validation.error(code, &cursor.path(), place, problem);
+            }
+        }
+        Ok(())
+    }
+
+    fn widen(&mut self, state: &[f32]) {
+        for ((min, max), value) in self.range.iter_mut().zip(state) {
+            *min = min.min(*value);
+            *max = max.max(*value);
+        }
+    }
+
+    fn row_problems(
+        &self,
+        batch: &FullFrameBatch,
+        at: usize,
+        row: &EpisodeRow,
+        frame: i64,
+        texts: &Texts,
+    ) -> Vec<(&'static str, String)> {
+        let mut problems = Vec::new();
+        let timestamp = (frame as f64 / f64::from(self.fps)) as f32;
+        if batch.timestamp[at] != timestamp {
+            problems.push(("frames.time", format!("timestamp is {}, but should be {timestamp}", batch.timestamp[at])));
+        }
+        let is_last = frame + 1 == row.n_frames;
+        let flags = (batch.done[at], batch.success[at]);
+        if flags != (is_last, is_last && row.is_success) {
+            problems.push(("frames.done", format!("(next.done, next.success) are {flags:?}")));
+        }
+        if frame == 0 && !batch.base.boundary[at] {
+            problems.push(("frames.boundary", "the first frame is no boundary".to_owned()));
+        }
+        problems
+            .extend(texts.task_problem(batch.task_index[at], &row.task_text).map(|problem| ("frames.task", problem)));
+        problems.extend(texts.subtask_problem(batch.subtask_index[at]).map(|problem| ("frames.task", problem)));
+        let one_hot = &batch.base.state[at][self.width - 2..];
+        if !matches!(one_hot, [1.0, 0.0] | [0.0, 1.0]) {
+            problems.push(("frames.state", format!("(open, closed) are {one_hot:?}")));
+        }
+        if batch.action[at].len() != ACTION_NAMES.len() || batch.gripper[at].len() != 3 {
+            let lengths = (batch.action[at].len(), batch.gripper[at].len());
+            problems.push(("frames.action", format!("action and gripper position are {lengths:?} wide, not (4, 3)")));
+        } else if is_last && batch.action[at] != [0.0, 0.0, 0.0, one_hot[1]] {
+            problems.push(("frames.action", format!("the last action is {:?}", batch.action[at])));
+        }
+        problems
+    }
+
+    /// Compares what was seen with `meta/stats.json`.
+    pub(super) fn compare_ranges(&self, root: &Path, texts: &Texts, validation: &mut Validation) {
+        let Some((min, max)) = &texts.state_range else { return };
+        // As floats: they were, before they became decimals.
+        let stated = min.iter().zip(max).map(|(min, max)| (*min as f32, *max as f32));
+        let pairs = self.range.iter().copied().zip(stated).enumerate();
+        if let Some((dimension, (seen, stated))) = pairs.into_iter().find(|(_, (seen, stated))| seen != stated) {
+            let message = format!(
+                "dimension {dimension} is from {} to {}, but the rows are from {} to {}",
+                stated.0, stated.1, seen.0, seen.1
+            );
+            validation.error("stats.range", &root.join(layout::STATS), "observation.state".to_owned(), message);
+        }
+    }
+}
+
+/// The action of the row before must lead to this one, later in time.
+fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
+    if batch.time_secs[at] <= before.time_secs || batch.recording_frame[at] <= before.recording_frame {
+        let found = (batch.time_secs[at], batch.recording_frame[at]);
+        return Some((
+            "frames.time",
+            format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
+        ));
+    }
+    let moved = batch.gripper[at].iter().zip(&before.gripper).map(|(here, there)| here - there);
+    let closed = batch.base.state[at].last().copied();
+    let expected: Vec<f32> = moved.chain(closed).collect();
+    (before.action != expected).then(|| {
+        ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
+    })
+}
+
+/// The deepest call that goes on from a frame, and its path.
+struct Label {
+    call_id: i64,
+    path: String,
+}
+
+/// The labels that frames should have, as the writer derives them.
+fn labels(calls: &[ProgramCall], n_frames: i64) -> Vec<Label> {
+    let n_frames = usize::try_from(n_frames).unwrap_or(0);
+    let mut running = vec![0; n_frames];
+    let mut paths: Vec<String> = Vec::new();
+    for (position, call) in calls.iter().enumerate() {
+        let caller = call.caller.and_then(|caller| paths.get(caller.0 as usize));
+        let path = caller.map_or_else(|| call.program.to_string(), |caller| format!("{caller}/{}", call.program));
+        paths.push(path);
+        let rows = call.frames.begin as usize..call.frames.last() as usize;
+        if call.depth > 0 && rows.end <= n_frames && !rows.is_empty() {
+            running[rows].fill(position);
+        }
+    }
+    running
+        .into_iter()
+        .map(|call| Label { call_id: call as i64, path: paths.get(call).cloned().unwrap_or_default() })
+        .collect()
+}
+
+fn label_problem(label: &Label, batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
+    let found = (batch.call_id[at], batch.program[at].as_str());
+    let expected = (label.call_id, label.path.as_str());
+    (found != expected).then(|| {
+        ("frames.label", format!("(ntp.call_id, ntp.program) are {found:?}, but the calls make them {expected:?}"))
+    })
+}

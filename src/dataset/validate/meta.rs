@@ -1,0 +1,221 @@
+//! What is there once for a dataset: declared features, task texts, statistics, files.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use crate::artifact::read_json;
+use crate::dataset::DatasetError;
+use crate::dataset::feature::{FEATURES, Feature};
+use crate::dataset::finding::Validation;
+use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::schema::{FRAMES, SUBTASKS, TASKS};
+use crate::dataset::statistics::FeatureStatistics;
+use crate::program::vocabulary_hash;
+use crate::table::{self, TableReader};
+
+/// Texts that frames refer to, and the range that observations should have. Empty where they could not be read.
+#[derive(Default)]
+pub(super) struct Texts {
+    tasks: Vec<String>,
+    subtasks: Vec<String>,
+    pub(super) state_range: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Texts {
+    /// What is wrong with a frame's task.
+    pub(super) fn task_problem(&self, task_index: i64, expected: &str) -> Option<String> {
+        let text = usize::try_from(task_index).ok().and_then(|index| self.tasks.get(index));
+        let is_known = self.tasks.is_empty() || text.is_some_and(|text| text == expected);
+        (!is_known).then(|| format!("task_index {task_index} is {text:?}, but the episode's task is {expected:?}"))
+    }
+
+    /// What is wrong with a frame's sub-task.
+    pub(super) fn subtask_problem(&self, subtask_index: i64) -> Option<String> {
+        let n_subtasks = self.subtasks.len();
+        let is_known = n_subtasks == 0 || usize::try_from(subtask_index).is_ok_and(|index| index < n_subtasks);
+        (!is_known).then(|| format!("subtask_index is {subtask_index}, but there are {n_subtasks}"))
+    }
+}
+
+/// Checks the files below `meta/` and `ntp/info.json`.
+pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
+    let mut texts = Texts::default();
+    let mut note = |result: Result<(), DatasetError>| {
+        if let Err(error) = result {
+            validation.failed("meta.row", &error);
+        }
+    };
+    let tasks = read_texts(root, layout::TASKS, &TASKS, ["task_index", "__index_level_0__"]);
+    note(tasks.map(|tasks| texts.tasks = tasks));
+    let subtasks = read_texts(root, layout::SUBTASKS, &SUBTASKS, ["subtask_index", "subtask"]);
+    note(subtasks.map(|subtasks| texts.subtasks = subtasks));
+    for (file, schema, text) in [(layout::TASKS, &TASKS, "__index_level_0__"), (layout::SUBTASKS, &SUBTASKS, "subtask")]
+    {
+        check_pandas_index(root, file, schema, text, validation);
+    }
+    let info = read_json::<Info>(&root.join(layout::INFO));
+    // A file of totals that cannot be read is found when the episodes are.
+    if let Ok(info) = info {
+        check_info(root, &info, &texts, validation);
+        texts.state_range = check_statistics(root, &info, validation);
+    }
+    check_ntp_info(root, validation);
+    texts
+}
+
+fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validation) {
+    let path = root.join(layout::INFO);
+    let mut error = |place: &str, message: String| validation.error("info.value", &path, place.to_owned(), message);
+    if info.codebase_version != LEROBOT_VERSION {
+        error("codebase_version", format!("it is {:?}, but {LEROBOT_VERSION:?} is read", info.codebase_version));
+    }
+    if info.total_tasks != texts.tasks.len() as u64 {
+        error(
+            "total_tasks",
+            format!("it is {}, but {} has {} rows", info.total_tasks, layout::TASKS, texts.tasks.len()),
+        );
+    }
+    let declared: BTreeMap<_, _> = info.features.0.iter().map(|(name, feature)| (name.as_str(), feature)).collect();
+    for feature in FEATURES {
+        match declared.get(feature.name) {
+            None => error("features", format!("{:?} is not declared", feature.name)),
+            Some(found) if found.dtype != feature.dtype => {
+                error(
+                    "features",
+                    format!("{:?} is declared as {:?}, not {:?}", feature.name, found.dtype, feature.dtype),
+                );
+            }
+            Some(_) => {}
+        }
+    }
+    let known: BTreeSet<_> = FEATURES.iter().map(|feature| feature.name).collect();
+    for name in declared.keys().filter(|name| !known.contains(*name)) {
+        validation.warn(
+            "info.features",
+            &path,
+            (*name).to_owned(),
+            "declared, but no feature of this version".to_owned(),
+        );
+    }
+}
+
+fn check_ntp_info(root: &Path, validation: &mut Validation) {
+    let path = root.join(layout::NTP_INFO);
+    match read_json::<NtpInfo>(&path) {
+        Err(error) => validation.failed("info.value", &error.into()),
+        Ok(info) => {
+            let mut error = |place: &str, message| validation.error("info.value", &path, place.to_owned(), message);
+            if info.schema_version != NTP_VERSION {
+                error("schema_version", format!("it is {}, but {NTP_VERSION} is read", info.schema_version));
+            }
+            if info.vocabulary_hash != vocabulary_hash() {
+                error("vocabulary_hash", "the programs are not those of this version".to_owned());
+            }
+        }
+    }
+}
+
+/// Reads a table of texts, whose rows must be in order of their numbers: readers take them by position.
+fn read_texts(
+    root: &Path,
+    file: &str,
+    schema: &table::TableSchema,
+    [number, text]: [&str; 2],
+) -> Result<Vec<String>, DatasetError> {
+    let path = root.join(file);
+    let mut columns = table::read(&path, schema)?;
+    let numbers = columns.int64(number)?;
+    let texts = columns.text(text)?;
+    let row_error = |row: usize, problem: String| DatasetError::Row { path: path.clone(), row: row as u64, problem };
+    if let Some((row, found)) = numbers.iter().enumerate().find(|(row, number)| **number != *row as i64) {
+        return Err(row_error(row, format!("{number} is {found}, but should be {row}")));
+    }
+    let mut seen = BTreeSet::new();
+    if let Some((row, text)) = texts.iter().enumerate().find(|(_, text)| !seen.insert(text.as_str())) {
+        return Err(row_error(row, format!("the text {text:?} is there twice")));
+    }
+    Ok(texts)
+}
+
+/// Checks that pandas makes the text the index of the table: `LeRobot` takes it from there.
+fn check_pandas_index(root: &Path, file: &str, schema: &table::TableSchema, text: &str, validation: &mut Validation) {
+    let path = root.join(file);
+    let Ok(reader) = TableReader::open_columns(&path, schema, &[text]) else { return };
+    let pandas = reader.metadata("pandas").and_then(|json| serde_json::from_str::<serde_json::Value>(json).ok());
+    if pandas.is_none_or(|pandas| pandas["index_columns"] != serde_json::json!([text])) {
+        let message =
+            format!("pandas metadata does not make {text:?} the index: LeRobot would take row numbers for texts");
+        validation.error("tasks.index", &path, String::new(), message);
+    }
+}
+
+/// Checks that every numeric feature has statistics in order; returns the range of observations.
+fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Option<(Vec<f64>, Vec<f64>)> {
+    let path = root.join(layout::STATS);
+    let stats: BTreeMap<String, FeatureStatistics> = match read_json(&path) {
+        Ok(stats) => stats,
+        Err(error) => {
+            validation.failed("stats.value", &error.into());
+            return None;
+        }
+    };
+    for feature in FEATURES.iter().filter(|feature| feature.is_numeric()) {
+        let problem = match stats.get(feature.name) {
+            None => Some("it has no statistics".to_owned()),
+            Some(statistics) => statistics_problem(statistics, feature, info),
+        };
+        if let Some(problem) = problem {
+            validation.error("stats.value", &path, feature.name.to_owned(), problem);
+        }
+    }
+    stats.get("observation.state").map(|state| (state.min.clone(), state.max.clone()))
+}
+
+fn statistics_problem(statistics: &FeatureStatistics, feature: &Feature, info: &Info) -> Option<String> {
+    let declared = info.features.0.iter().find(|(name, _)| name == feature.name)?;
+    let width = declared.1.shape.first().copied().unwrap_or(1);
+    let FeatureStatistics { min, max, mean, std, count, q01, q10, q50, q90, q99 } = statistics;
+    let lists = [min, q01, q10, q50, q90, q99, max, mean, std];
+    if let Some(list) = lists.iter().find(|list| list.len() != width) {
+        return Some(format!("it has {width} dimensions, but statistics of {}", list.len()));
+    }
+    if *count != [info.total_frames as i64] {
+        return Some(format!("count is {count:?}, but there are {} frames", info.total_frames));
+    }
+    let in_order = |at: usize| lists[..7].windows(2).all(|pair| pair[0][at] <= pair[1][at]) && std[at] >= 0.0;
+    (0..width)
+        .find(|&at| !in_order(at))
+        .map(|at| format!("dimension {at}: minimum, quantiles, maximum are not in order"))
+}
+
+/// Files that no episode names and columns that are not declared: `LeRobot` takes all files that lie there, and refuses
+/// columns that it does not know of.
+pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &mut Validation) {
+    let listed: BTreeSet<PathBuf> = data.iter().map(|place| place.in_dataset(root, layout::DATA)).collect();
+    let mut found: Vec<PathBuf> = files_below(&root.join(layout::DATA)).unwrap_or_default();
+    found.sort_unstable();
+    for path in found.iter().filter(|path| !listed.contains(*path)) {
+        let message = "no episode is in this file, but readers that take all files of the folder would read it";
+        validation.error("file.unlisted", path, String::new(), message.to_owned());
+    }
+    for path in &listed {
+        let Ok(reader) = TableReader::open_columns(path, &FRAMES, &["index"]) else { continue };
+        let known = |name: &&str| FEATURES.iter().any(|feature| feature.name == *name);
+        if let Some(name) = reader.file_columns().find(|name| !known(name)) {
+            let message = format!("column {name:?} is not declared in {}", layout::INFO);
+            validation.error("file.undeclared", path, String::new(), message);
+        }
+    }
+}
+
+fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for chunk in std::fs::read_dir(folder)? {
+        let chunk = chunk?.path();
+        for file in std::fs::read_dir(&chunk).into_iter().flatten() {
+            files.push(file?.path());
+        }
+    }
+    Ok(files)
+}
