@@ -54,6 +54,8 @@ pub struct RolloutEpisode {
     pub decisions: u32,
     /// The first that differs from the expert's; `None` when none does.
     pub first_divergence: Option<Divergence>,
+    /// The decision whose primitive was the first that went wrong in physics; `None` when none did.
+    pub fault_decision: Option<u32>,
     /// What an adversary did; `None` in a world without one.
     pub pushes: Option<Vec<Push>>,
 }
@@ -93,7 +95,8 @@ struct Running<'t> {
     limits: Limits,
     decisions: u32,
     first_divergence: Option<Divergence>,
-    first_cause: Option<Cause>,
+    /// What first went wrong in physics, at which decision.
+    first_fault: Option<(u32, Cause)>,
     gave_up: bool,
 }
 
@@ -114,7 +117,7 @@ impl<'t> Running<'t> {
             expectation,
             decisions: 0,
             first_divergence: None,
-            first_cause: None,
+            first_fault: None,
             gave_up: false,
         }
     }
@@ -138,6 +141,7 @@ impl<'t> Running<'t> {
     fn step(&mut self) {
         let Some(decision) = self.pending.take() else { return };
         let caller = self.calls.top().map_or(Program::None, |top| top.program);
+        let number = self.decisions;
         let Decision { program, scope, argument, end_of_program, prediction } = decision;
         let scope = (program != Program::None).then_some(scope);
         let new = NewCall { program, argument, scope, end_of_program, prediction };
@@ -147,7 +151,7 @@ impl<'t> Running<'t> {
         if let Some(action) = Action::new(program, argument)
             && let Err(cause) = self.world.act(action)
         {
-            self.first_cause.get_or_insert(cause);
+            self.first_fault.get_or_insert((number, cause));
         }
         if !program.is_composite() {
             self.calls.returned(self.frame());
@@ -180,10 +184,11 @@ impl<'t> Running<'t> {
     fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
         let at_rest = self.world.settle();
         let reached = goal_holds(self.world.scene(), &at_rest, &self.task.conditions);
+        let fault = self.first_fault.map(|(_, cause)| cause);
         let outcome = match (self.gave_up, reached) {
             (false, true) => Outcome::Success,
-            (false, false) => Outcome::Failure(self.first_cause.unwrap_or(Cause::EndedEarly)),
-            (true, _) => Outcome::Failure(self.first_cause.unwrap_or(Cause::NeverEnded)),
+            (false, false) => Outcome::Failure(fault.unwrap_or(Cause::EndedEarly)),
+            (true, _) => Outcome::Failure(fault.unwrap_or(Cause::NeverEnded)),
         };
         let frame = self.frame();
         let calls = self.calls.finish(frame);
@@ -200,6 +205,7 @@ impl<'t> Running<'t> {
             episode,
             decisions: self.decisions,
             first_divergence: self.first_divergence,
+            fault_decision: self.first_fault.map(|(decision, _)| decision),
             pushes: self.world.pushes().map(<[Push]>::to_vec),
         })
     }
