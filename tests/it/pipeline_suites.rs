@@ -124,6 +124,6 @@ fn settings_of_suites_out_of_range_are_refused_by_key() {
     check_refused(&with("force = 1.0"), 8, 2, &["imported.toml", "force", "probability", "impulse_ns"]);
     let order = PIPELINE.replace("\"shuffled\"", "\"backwards\"");
     check_refused(&order, 8, 2, &["imported.toml", "backwards", "own", "shuffled"]);
-    let sorting = PIPELINE.replace("block_stacking", "object_sorting").replace("import", "# import");
+    let sorting = PIPELINE.replace("block_stacking", "object_sorting").replace("import = ", "# import = ");
     check_refused(&sorting, 8, 2, &["rollout.suites[1].order", "object_sorting builds no towers", "block_stacking"]);
 }
