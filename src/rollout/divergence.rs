@@ -1,8 +1,9 @@
 //! What the expert would decide in an episode, and where a policy first differs.
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
-use crate::trace::{CallId, Episode, ProgramCall};
+use crate::trace::{CallId, Episode, ProgramCall, Span};
 
 /// How a decision differs from the expert's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -65,6 +66,20 @@ pub fn expected_calls<'d>(demonstration: &'d Episode, scene: &Scene) -> Vec<&'d 
         }
     }
     expected
+}
+
+/// What of the expert's calls a policy is expected to decide; the whole of the specification is `whole`.
+pub(super) fn decided_of(decisions: Decisions, whole: Option<Span>, calls: &[ProgramCall]) -> Vec<ProgramCall> {
+    let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
+    match decisions {
+        Decisions::Scoped => calls.to_vec(),
+        Decisions::Unscoped => calls.iter().cloned().map(unscoped).collect(),
+        Decisions::Primitives => {
+            let end_of_program = |call: &ProgramCall| call.program == Program::None;
+            let decided = calls.iter().filter(|call| !call.program.is_composite());
+            decided.map(|call| ProgramCall { end_of_program: end_of_program(call), ..call.clone() }).collect()
+        }
+    }
 }
 
 /// A call and all below it, which follow it in the order of calling.

@@ -12,6 +12,8 @@
 
 use std::collections::VecDeque;
 
+use crate::model::Decisions;
+use crate::rollout::divergence::decided_of;
 use crate::rollout::expected_calls;
 use crate::scene::{BodyIndex, Scene, SlotIndex};
 use crate::task::{Family, rests_on};
@@ -45,8 +47,8 @@ struct Stacked {
 }
 
 impl Expectation {
-    /// For repeating a demonstration in a scene.
-    pub fn new(demonstration: &Episode, scene: &Scene) -> Self {
+    /// For repeating a demonstration in a scene, by a policy that decides so much.
+    pub fn new(decisions: Decisions, demonstration: &Episode, scene: &Scene) -> Self {
         let family = demonstration.provenance.family;
         let mut sub_tasks: Vec<SubTask> = Vec::new();
         for call in expected_calls(demonstration, scene) {
@@ -57,6 +59,10 @@ impl Expectation {
         }
         if family == Family::BlockStacking {
             sub_tasks.iter_mut().for_each(|sub_task| sub_task.stacked = Stacked::of(&sub_task.calls, scene));
+        }
+        let whole = demonstration.calls.first().and_then(|root| root.output);
+        for sub_task in &mut sub_tasks {
+            sub_task.calls = decided_of(decisions, whole, &sub_task.calls);
         }
         Self { sub_tasks, ..Self::default() }
     }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::robot::{Action, RobotApi};
 use crate::rollout::divergence::divergence;
@@ -67,7 +68,8 @@ pub struct RolloutEpisode {
 ///
 /// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
 pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
-    let mut running: Vec<Running<'_>> = starts.into_iter().map(|start| Running::new(start, limits)).collect();
+    let mut running: Vec<Running<'_>> =
+        starts.into_iter().map(|start| Running::new(start, policy.decides(), limits)).collect();
     loop {
         let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
         if queries.is_empty() {
@@ -101,10 +103,10 @@ struct Running<'t> {
 }
 
 impl<'t> Running<'t> {
-    fn new(start: Start<'t>, limits: Limits) -> Self {
+    fn new(start: Start<'t>, decisions: Decisions, limits: Limits) -> Self {
         let Start { task, demonstration, world, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expectation = Expectation::new(&demonstration, world.scene());
+        let expectation = Expectation::new(decisions, &demonstration, world.scene());
         let specification = Arc::new(Specification::of(&demonstration));
         Self {
             task,

@@ -1,5 +1,6 @@
 //! A policy that does what the expert would do: it tests the interpreter, before any learning.
 
+use crate::model::Decisions;
 use crate::rollout::{Decision, Expectation, Policy, Query, Start};
 
 /// Knows for each episode what the expert would call next. What is knocked over it builds again.
@@ -16,8 +17,9 @@ impl Oracle {
 
     /// For the episodes of [`super::run`] with the same starts.
     pub fn for_starts(starts: &[Start<'_>]) -> Self {
-        let expectation =
-            |start: &Start<'_>| Expectation::new(&start.demonstration.clone().boundaries_only(), start.world.scene());
+        let expectation = |start: &Start<'_>| {
+            Expectation::new(Decisions::Scoped, &start.demonstration.clone().boundaries_only(), start.world.scene())
+        };
         Self::new(starts.iter().map(expectation).collect())
     }
 

@@ -26,7 +26,7 @@ use crate::trace::Push;
 /// Directions that a push is chosen from.
 const DIRECTIONS: usize = 16;
 /// How far what falls rolls on beyond the tower's height, in metres.
-const ROLL_M: f32 = 0.15;
+const ROLL_M: f32 = 0.2;
 /// Half of the width of its way, in metres.
 const WAY_M: f32 = 0.05;
 /// A body stands on another when its centre is no more than this above where it would touch it, in metres.

@@ -31,6 +31,11 @@ fn write_parquet(path: &Path, mut table: DataFrame) {
     ParquetWriter::new(File::create(path).unwrap()).finish(&mut table).unwrap();
 }
 
+/// So many times its episode for the rollouts that met an adversary: those of `ntp`.
+fn disturbed(row: &Rollout, times: i64) -> Option<i64> {
+    (row.variant == "ntp").then_some(times * row.episode)
+}
+
 fn rollouts_table(rows: &[Rollout]) -> DataFrame {
     let text = |of: fn(&Rollout) -> &'static str| rows.iter().map(of).collect::<Vec<_>>();
     let maybe = |of: fn(&Rollout) -> Option<&'static str>| rows.iter().map(of).collect::<Vec<_>>();
@@ -54,8 +59,8 @@ fn rollouts_table(rows: &[Rollout]) -> DataFrame {
         "specification" => maybe(|_| Some("trajectories")),
         "decoder" => maybe(|row| Some(row.decoder)),
         "fault_decision" => rows.iter().map(|row| row.fault).collect::<Vec<_>>(),
-        "pushes" => rows.iter().map(|row| (row.variant == "ntp").then_some(row.episode)).collect::<Vec<_>>(),
-        "toppled" => rows.iter().map(|row| (row.variant == "ntp").then_some(2 * row.episode)).collect::<Vec<_>>(),
+        "pushes" => rows.iter().map(|row| disturbed(row, 1)).collect::<Vec<_>>(),
+        "toppled" => rows.iter().map(|row| disturbed(row, 2)).collect::<Vec<_>>(),
     )
     .unwrap()
 }
@@ -395,6 +400,8 @@ fn write_own_table(path: &Path) {
         ("specification", maybe(|_| Some("trajectories"))),
         ("decoder", maybe(|row| Some(row.decoder))),
         ("fault_decision", Column::OptionalInt64(rows.iter().map(|row| row.fault).collect())),
+        ("pushes", Column::OptionalInt64(rows.iter().map(|row| disturbed(row, 1)).collect())),
+        ("toppled", Column::OptionalInt64(rows.iter().map(|row| disturbed(row, 2)).collect())),
     ];
     write(path, &TableSchema::ROLLOUTS, columns).unwrap();
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use ntp::model::Decisions;
 use ntp::program::Program;
 use ntp::rollout::{Decision, Expectation, Limits, Oracle, Policy, Query, Start, run};
 use ntp::task::{Split, Task};
@@ -56,7 +57,7 @@ fn rollout(task: &Task) -> (Episode, Episode) {
         world: Box::new(KinematicWorld::new(task.family, &own_trial)),
         provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 42),
     };
-    let expected = Expectation::new(&start.demonstration, start.world.scene());
+    let expected = Expectation::new(Decisions::Scoped, &start.demonstration, start.world.scene());
     let mut policy = Sure(Oracle::new(vec![expected]));
     let episode = run(&mut policy, vec![start], Limits::default()).unwrap().remove(0).episode;
     (shown, smooth(episode))

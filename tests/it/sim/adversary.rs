@@ -44,11 +44,11 @@ fn pushes_of_the_default_impulse_topple_towers_of_every_height_and_leave_them_on
             assert_eq!(pushes(&world).len(), 1, "one placement, one push");
             n_toppled += usize::from(!pushes(&world)[0].toppled.is_empty());
             let state = world.state();
-            n_off += state.bodies_in_world.iter().filter(|pose| pose.translation.vector.z < 0.0).count();
+            n_off += usize::from(state.bodies_in_world.iter().any(|pose| pose.translation.vector.z < 0.0));
         }
     }
     assert!(n_toppled >= 34, "{n_toppled} of 36 pushes toppled something");
-    assert!(n_off <= 1, "{n_off} blocks fell off the table in 36 pushes");
+    assert!(n_off <= 1, "{n_off} of 36 pushes pushed something off the table");
 }
 
 #[test]
