@@ -7,6 +7,7 @@ pub(super) mod bars;
 pub(super) mod curves;
 pub(super) mod dots;
 pub(super) mod histogram;
+pub(super) mod lines;
 pub(super) mod scale;
 
 use serde::Serialize;
