@@ -11,7 +11,7 @@ use crate::report::chart::dots::{self, DotPlot};
 use crate::report::chart::histogram::{self, Histograms};
 use crate::report::chart::lines::{self, LinePlot};
 use crate::report::chart::scale::{percent, thousands};
-use crate::report::chart::{Key, PANEL, Panel, color_of, distinct};
+use crate::report::chart::{Key, PANEL, Panel, color_of, distinct, has_paper_encoder};
 use crate::report::claims::{Claim, Verdict};
 use crate::report::metrics::{self, Curve};
 use crate::report::order::{self, DECODERS};
@@ -122,7 +122,7 @@ struct SeedRow {
 /// The page of a report.
 pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, minijinja::Error> {
     let trained = distinct(curves.iter().map(|curve| &curve.model.variant));
-    let key = |name: &String| Key { label: name.clone(), color: color_of(name) };
+    let key = |name: &String| Key::of_variant(name);
     let last_step = curves.iter().flat_map(|curve| &curve.points).map(|point| point.step).max().unwrap_or(0);
     let steps_per_point = metrics::steps_per_bin(last_step) as u64;
     let leading = order::leading(&report.aggregates);
@@ -146,7 +146,7 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
         claims: claim_rows(&report.claims),
         figures: report.figures.iter().map(lines::plot).collect(),
         figure_keys: figure_keys(in_figures()),
-        has_paper_encoder: in_figures().any(|variant| variant.ends_with("_paper")),
+        has_paper_encoder: in_figures().any(|variant| has_paper_encoder(variant)),
         adversary: tables::adversary(&report.figures),
         heat: tables::heat(&report.grids),
         models: tables::models(&report.models),
@@ -183,7 +183,7 @@ fn figure_keys<'a>(variants: impl Iterator<Item = &'a String>) -> Vec<Key> {
     let kinds: Vec<String> = variants.map(|name| name.strip_suffix("_paper").unwrap_or(name).to_owned()).collect();
     let mut kinds = distinct(kinds.iter());
     kinds.sort_by_cached_key(|kind| order::variant(kind));
-    kinds.into_iter().map(|label| Key { color: color_of(&label), label }).collect()
+    kinds.iter().map(|kind| Key::of_variant(kind)).collect()
 }
 
 fn fact_groups(facts: &[Fact]) -> Vec<FactGroup<'_>> {

@@ -80,7 +80,7 @@ pub(in crate::report) fn plot(
         Some(Histogram { programs: programs(errors, variant), ..histogram })
     };
     let panels: Vec<Histogram> = variants.iter().filter_map(panel).collect();
-    let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color };
+    let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color, hollow: false };
     (!panels.is_empty()).then(|| Histograms { keys: KINDS.into_iter().map(key).collect(), panels })
 }
 

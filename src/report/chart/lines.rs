@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{coordinate, percent, short, thousands};
-use crate::report::chart::{PANEL, Tick, color_of};
+use crate::report::chart::{PANEL, Tick, color_of, has_paper_encoder};
 use crate::report::figures::{Figure, Series};
 
 /// One figure of the paper.
@@ -127,7 +127,7 @@ fn line(series: &Series, places: &Places, shift: f64) -> PlotLine {
     PlotLine {
         label: series.variant.clone(),
         color: color_of(&series.variant),
-        dashed: series.variant.ends_with("_paper"),
+        dashed: has_paper_encoder(&series.variant),
         path: path(dots.iter().map(|dot| (&dot.x, &dot.y))),
         dots,
     }
