@@ -12,7 +12,9 @@
 
 mod aggregate;
 mod chart;
+mod claims;
 mod csv;
+mod figures;
 mod frames;
 mod interval;
 mod markdown;
@@ -22,7 +24,10 @@ mod page;
 mod paper;
 mod rollouts;
 mod summary;
+mod tables;
 
+pub use claims::{Claim, Verdict};
+pub use figures::{Figure, Grid, GridCell, PaperPoint, Point, Series};
 pub use interval::wilson;
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
@@ -133,11 +138,15 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
     let files = input_files(inputs, out)?;
     let rollouts = rollouts::read(&inputs.rollouts)?;
     let curves = metrics::read(&inputs.metrics)?;
+    let aggregates = aggregate::aggregates(&rollouts.results, &inputs.paper);
     let report = Report {
         schema_version: summary::SCHEMA_VERSION,
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
         title: inputs.title.clone(),
-        aggregates: aggregate::aggregates(&rollouts.results, &inputs.paper),
+        claims: claims::claims(&aggregates),
+        figures: figures::figures(&aggregates),
+        grids: figures::grids(&aggregates),
+        aggregates,
         results: rollouts.results,
         divergences: rollouts.divergences,
         errors: rollouts.errors,

@@ -33,6 +33,7 @@ fn describe(path: &Path) -> anyhow::Result<Value> {
         Kind::Rollouts => rollouts(path)?,
         Kind::Report => report(path)?,
         Kind::Run => run_directory(path)?,
+        Kind::Study => study(path)?,
     };
     Ok(json!({ "kind": kind.name(), "path": path, "details": details }))
 }
@@ -79,6 +80,15 @@ fn run_directory(path: &Path) -> anyhow::Result<Value> {
         Ok((name.display().to_string(), Value::from(Kind::of(part)?.name())))
     });
     Ok(Value::Object(lines.collect::<anyhow::Result<_>>()?))
+}
+
+fn study(path: &Path) -> anyhow::Result<Value> {
+    let experiments = kind::experiments(path)?;
+    let parts = experiments.iter().map(|run| {
+        let name = run.strip_prefix(path).unwrap_or(run);
+        Ok((name.display().to_string(), run_directory(run)?))
+    });
+    Ok(Value::Object(parts.collect::<anyhow::Result<_>>()?))
 }
 
 /// One `key: value` a line, indented by depth.

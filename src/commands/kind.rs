@@ -26,6 +26,8 @@ pub(super) enum Kind {
     Report,
     /// A run directory.
     Run,
+    /// The run directory of a study.
+    Study,
 }
 
 impl Kind {
@@ -40,6 +42,7 @@ impl Kind {
             Self::Rollouts => "rollouts",
             Self::Report => "report",
             Self::Run => "run",
+            Self::Study => "study",
         }
     }
 
@@ -71,14 +74,28 @@ impl Kind {
         let holds_recordings = || super::replay::recordings(path).is_ok();
         match marked {
             Some((_, kind)) => Ok(kind),
+            None if !experiments(path)?.is_empty() => Ok(Self::Study),
             None if holds_recordings() => Ok(Self::Recordings),
             None => anyhow::bail!(
                 "{} is none of: recordings, dataset (meta/info.json), model (config.json), rollouts \
-                 (rollouts.parquet), report (report.json), tasks (tasks.json), run",
+                 (rollouts.parquet), report (report.json), tasks (tasks.json), run, study",
                 path.display()
             ),
         }
     }
+}
+
+/// The run directories in that of a study, in order of names.
+pub(super) fn experiments(study: &Path) -> anyhow::Result<Vec<std::path::PathBuf>> {
+    let mut experiments = Vec::new();
+    for entry in std::fs::read_dir(study)? {
+        let path = entry?.path();
+        if path.join("tasks/tasks.json").is_file() {
+            experiments.push(path);
+        }
+    }
+    experiments.sort();
+    Ok(experiments)
 }
 
 /// The artifacts of a run directory that are there, in the order of the data.

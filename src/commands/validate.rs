@@ -32,10 +32,12 @@ struct Validation {
 pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
     let mut validation = Validation::default();
     match Kind::of(&args.path)? {
-        Kind::Run => {
-            for part in kind::parts_of_run(&args.path)? {
-                check(&part, Kind::of(&part)?, &mut validation)?;
+        Kind::Run => check_run(&args.path, &mut validation)?,
+        Kind::Study => {
+            for experiment in kind::experiments(&args.path)? {
+                check_run(&experiment, &mut validation)?;
             }
+            check_run(&args.path, &mut validation)?;
         }
         kind => check(&args.path, kind, &mut validation)?,
     }
@@ -45,6 +47,14 @@ pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
         output::print(&to_text(&validation))?;
     }
     Ok(if validation.findings.is_empty() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}
+
+/// Checks what lies in a run directory.
+fn check_run(path: &Path, validation: &mut Validation) -> anyhow::Result<()> {
+    for part in kind::parts_of_run(path)? {
+        check(&part, Kind::of(&part)?, validation)?;
+    }
+    Ok(())
 }
 
 fn to_text(validation: &Validation) -> String {
@@ -74,7 +84,7 @@ fn check(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result
         }
         Kind::Model => model::inspect(path).map(|found| format!("{} parameters", found.parameters)).map_err(Into::into),
         Kind::Rollouts => check_rollouts(path),
-        Kind::Report | Kind::Run => Ok("report".to_owned()),
+        Kind::Report | Kind::Run | Kind::Study => Ok("report".to_owned()),
     };
     match held {
         Ok(held) if validation.findings.len() == before => {
@@ -96,7 +106,7 @@ fn content_code(kind: Kind) -> &'static str {
         Kind::Dataset => "DATASET",
         Kind::Model => "MODEL",
         Kind::Rollouts => "ROLLOUTS",
-        Kind::Report | Kind::Run => "REPORT",
+        Kind::Report | Kind::Run | Kind::Study => "REPORT",
     }
 }
 

@@ -7,6 +7,7 @@ pub(super) mod bars;
 pub(super) mod curves;
 pub(super) mod dots;
 pub(super) mod histogram;
+pub(super) mod lines;
 pub(super) mod scale;
 
 use serde::Serialize;
@@ -29,6 +30,20 @@ pub(in crate::report) struct Tick {
 pub(in crate::report) struct Key {
     pub(in crate::report) label: String,
     pub(in crate::report) color: usize,
+    /// Whether it is a variant with the paper's encoder.
+    pub(in crate::report) hollow: bool,
+}
+
+impl Key {
+    /// A variant's line.
+    pub(in crate::report) fn of_variant(variant: &str) -> Self {
+        Self { label: variant.to_owned(), color: color_of(variant), hollow: has_paper_encoder(variant) }
+    }
+}
+
+/// Whether a variant sees the paper's flattened input; the others compare objects.
+pub(in crate::report) fn has_paper_encoder(variant: &str) -> bool {
+    variant.ends_with("_paper")
 }
 
 /// A panel's size and the rectangle in it that data is drawn in.

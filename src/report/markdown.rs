@@ -2,6 +2,7 @@
 
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
+use crate::report::claims::{Claim, Verdict};
 use crate::report::summary::{Aggregate, Report};
 
 /// The columns, and whether numbers stand in them.
@@ -24,7 +25,22 @@ pub(super) fn render(report: &Report) -> String {
         text.push('\n');
         text.push_str(&table(&COLUMNS, report.aggregates.iter().map(row).collect()));
     }
+    if !report.claims.is_empty() {
+        text.push('\n');
+        text.push_str(&table(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect()));
+    }
     text
+}
+
+const CLAIM_COLUMNS: [(&str, bool); 4] =
+    [("the paper's claim", false), ("encoder", false), ("here", false), ("figures", false)];
+
+fn claim(claim: &Claim) -> Vec<String> {
+    let verdict = match claim.verdict {
+        Verdict::Reproduced => claim.verdict.words().to_owned(),
+        _ => format!("**{}**", claim.verdict.words()),
+    };
+    vec![claim.claim.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
 }
 
 /// What made the figures: program, commit, seeds, cost.

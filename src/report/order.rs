@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use crate::program::Program;
-use crate::report::summary::Actor;
+use crate::report::summary::{Actor, Aggregate};
 use crate::task::Family;
 
 /// Variants from the paper's model to its ancestor; the oracle stands last.
@@ -11,6 +11,23 @@ const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru
 
 /// Decoders, the one that stands for its model where only one can be shown first.
 pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];
+
+/// Of the rows of one variant in a suite of an experiment the one that stands for it: the most training tasks, the
+/// first decoder. Rows stand sorted by [`suite`] and [`actor`], so it is the first.
+pub(super) fn leading(aggregates: &[Aggregate]) -> Vec<Aggregate> {
+    let mut leading: Vec<Aggregate> = Vec::new();
+    for row in aggregates {
+        let is_same = |other: &Aggregate| {
+            let (own, other_actor) = (&row.actor, &other.actor);
+            other.suite == row.suite
+                && (&own.experiment, &own.variant) == (&other_actor.experiment, &other_actor.variant)
+        };
+        if !leading.iter().any(is_same) {
+            leading.push(row.clone());
+        }
+    }
+    leading
+}
 
 /// What a suite asks of a family.
 const PARTS: [&str; 4] = ["unseen", "seen", "topology", "adversary"];

@@ -9,11 +9,14 @@ use crate::report::chart::bars::{self, BarPlot};
 use crate::report::chart::curves::{self, CurveGrid};
 use crate::report::chart::dots::{self, DotPlot};
 use crate::report::chart::histogram::{self, Histograms};
+use crate::report::chart::lines::{self, LinePlot};
 use crate::report::chart::scale::{percent, thousands};
-use crate::report::chart::{Key, PANEL, Panel, color_of, distinct};
+use crate::report::chart::{Key, PANEL, Panel, color_of, distinct, has_paper_encoder};
+use crate::report::claims::{Claim, Verdict};
 use crate::report::metrics::{self, Curve};
 use crate::report::order::{self, DECODERS};
 use crate::report::summary::{Actor, Aggregate, Fact, Report, SuiteResult};
+use crate::report::tables::{self, AdversaryRow, CostRow, HeatGrid, ModelRow};
 
 /// Most headline figures.
 const N_TILES: usize = 4;
@@ -36,6 +39,29 @@ struct Page<'a> {
     steps_per_point: String,
     divergence: Option<Histograms>,
     facts: Vec<FactGroup<'a>>,
+    claims: Vec<ClaimRow<'a>>,
+    figures: Vec<LinePlot>,
+    figure_keys: Vec<Key>,
+    has_paper_encoder: bool,
+    adversary: Vec<AdversaryRow>,
+    heat: Vec<HeatGrid>,
+    models: Vec<ModelRow>,
+    cost_stages: Vec<String>,
+    costs: Vec<CostRow>,
+    total_cpu_mins: String,
+}
+
+/// A claim of the paper.
+#[derive(Serialize)]
+struct ClaimRow<'a> {
+    claim: &'a str,
+    /// Whether it stands in the row before too.
+    again: bool,
+    encoder: &'a str,
+    ours: &'a str,
+    verdict: &'static str,
+    /// Names its colour.
+    class: Verdict,
 }
 
 /// What there is to say of one experiment.
@@ -96,24 +122,37 @@ struct SeedRow {
 /// The page of a report.
 pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, minijinja::Error> {
     let trained = distinct(curves.iter().map(|curve| &curve.model.variant));
-    let key = |name: &String| Key { label: name.clone(), color: color_of(name) };
+    let key = |name: &String| Key::of_variant(name);
     let last_step = curves.iter().flat_map(|curve| &curve.points).map(|point| point.step).max().unwrap_or(0);
     let steps_per_point = metrics::steps_per_bin(last_step) as u64;
+    let leading = order::leading(&report.aggregates);
+    let (cost_stages, costs) = tables::costs(&report.costs);
+    let in_figures = || report.figures.iter().flat_map(|figure| &figure.series).map(|series| &series.variant);
     let page = Page {
         report,
         style: include_str!("style.css"),
         panel: PANEL,
         lede: lede(report),
-        tiles: tiles(&report.aggregates),
-        dots: dots::plot(&report.aggregates, &report.results),
+        tiles: tiles(&leading),
+        dots: dots::plot(&leading, &report.results),
         rows: rows(&report.aggregates),
         seeds: report.results.iter().map(seed_row).collect(),
-        bars: bars::plot(&report.aggregates),
+        bars: bars::plot(&leading),
         variants: trained.iter().map(key).collect(),
         curves: curves::grids(curves),
         steps_per_point: plural(steps_per_point, "step", "steps"),
-        divergence: histogram::plot(&report.divergences, &report.aggregates),
+        divergence: histogram::plot(&report.divergences, &report.errors, &report.aggregates),
         facts: fact_groups(&report.facts),
+        claims: claim_rows(&report.claims),
+        figures: report.figures.iter().map(lines::plot).collect(),
+        figure_keys: figure_keys(in_figures()),
+        has_paper_encoder: in_figures().any(|variant| has_paper_encoder(variant)),
+        adversary: tables::adversary(&report.figures),
+        heat: tables::heat(&report.grids),
+        models: tables::models(&report.models),
+        cost_stages,
+        costs,
+        total_cpu_mins: format!("{:.1}", report.costs.iter().map(|cost| cost.cpu_secs).sum::<f64>() / 60.0),
     };
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -122,6 +161,29 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
     environment.add_template("charts.html.j2", include_str!("charts.html.j2"))?;
     environment.add_template("page.html.j2", include_str!("page.html.j2"))?;
     environment.get_template("page.html.j2")?.render(page)
+}
+
+fn claim_rows(claims: &[Claim]) -> Vec<ClaimRow<'_>> {
+    let mut rows: Vec<ClaimRow<'_>> = Vec::with_capacity(claims.len());
+    for (at, claim) in claims.iter().enumerate() {
+        rows.push(ClaimRow {
+            claim: &claim.claim,
+            again: at > 0 && claims[at - 1].id == claim.id,
+            encoder: &claim.encoder,
+            ours: &claim.ours,
+            verdict: claim.verdict.words(),
+            class: claim.verdict,
+        });
+    }
+    rows
+}
+
+/// Kinds of variants, whichever their encoder.
+fn figure_keys<'a>(variants: impl Iterator<Item = &'a String>) -> Vec<Key> {
+    let kinds: Vec<String> = variants.map(|name| name.strip_suffix("_paper").unwrap_or(name).to_owned()).collect();
+    let mut kinds = distinct(kinds.iter());
+    kinds.sort_by_cached_key(|kind| order::variant(kind));
+    kinds.iter().map(|kind| Key::of_variant(kind)).collect()
 }
 
 fn fact_groups(facts: &[Fact]) -> Vec<FactGroup<'_>> {

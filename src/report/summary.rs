@@ -10,6 +10,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::PaperValue;
+use crate::report::claims::Claim;
+use crate::report::figures::{Figure, Grid};
 
 /// Version of the file.
 pub(super) const SCHEMA_VERSION: u32 = 1;
@@ -27,6 +29,12 @@ pub struct Report {
     pub results: Vec<SuiteResult>,
     /// One for each actor and suite, over training seeds.
     pub aggregates: Vec<Aggregate>,
+    /// What the paper claims, judged by these results.
+    pub claims: Vec<Claim>,
+    /// The paper's figures from these results.
+    pub figures: Vec<Figure>,
+    /// Table Clean-up by bowls and forks.
+    pub grids: Vec<Grid>,
     /// Where rollouts first decided otherwise than the expert.
     pub divergences: Vec<Divergence>,
     /// What failed rollouts did wrong first.

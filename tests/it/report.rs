@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use ntp::report::{
-    Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, json_schema, make, paper_values,
+    Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, Verdict, json_schema, make, paper_values,
 };
 use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
 use serde_json::{Value, json};
@@ -284,6 +284,10 @@ fn the_markdown_says_what_made_the_figures() {
     | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | -------------- | ----: |
     | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978] | 0.863 |
     | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658] |     - |
+
+    | the paper's claim                                 | encoder        | here       | figures                                                                         |
+    | ------------------------------------------------- | -------------- | ---------- | ------------------------------------------------------------------------------- |
+    | NTP stacks unseen configurations better than Flat | object-centric | reproduced | ntp 0.900 (stacking_unseen, 100 tasks), flat 0.000 (stacking_unseen, 100 tasks) |
     ");
 }
 
@@ -510,4 +514,105 @@ fn the_committed_report_schema_is_the_generated_one() {
         std::fs::write(&path, &generated).unwrap();
         panic!("{} was stale and has been written anew: look at the change and commit it", path.display());
     }
+}
+
+/// So many rollouts of which the first ones succeed.
+fn rollouts(variant: &'static str, suite: &'static str, successes: i64, episodes: i64) -> Vec<Rollout> {
+    let row = |episode| Rollout {
+        variant,
+        suite,
+        seed: 0,
+        episode,
+        cause: (episode >= successes).then_some("never_ended"),
+        divergence: None,
+        train_tasks: 4,
+        decoder: "mss",
+        fault: None,
+    };
+    (0..episodes).map(row).collect()
+}
+
+#[test]
+fn a_figure_of_the_paper_has_ours_and_theirs_by_length() {
+    let rows = [
+        rollouts("ntp", "sorting_unseen_4", 19, 20),
+        rollouts("ntp", "sorting_unseen_40", 18, 20),
+        rollouts("flat_paper", "sorting_unseen_4", 2, 20),
+        rollouts("ntp", "sorting_unseen_mixed", 0, 20),
+    ];
+    let report = Run::new(&rows.concat()).make();
+    let [figure] = report.figures.as_slice() else { panic!("{:?}", report.figures) };
+    assert_eq!(figure.id, "sorting_length");
+    let points = |at: usize| {
+        let series = &figure.series[at];
+        let ours: Vec<_> = series.ours.iter().map(|point| (point.x, point.success_rate)).collect();
+        let paper: Vec<_> = series.paper.iter().map(|point| (point.x, point.success_rate)).collect();
+        (series.variant.as_str(), ours, paper)
+    };
+    assert_eq!(points(0), ("ntp", vec![(4, 0.95), (40, 0.9)], vec![(4, 0.9), (40, 0.9)]));
+    assert_eq!(points(1), ("flat_paper", vec![(4, 0.1)], vec![(4, 0.4), (40, 0.25)]));
+}
+
+#[test]
+fn clean_up_becomes_a_grid_of_bowls_and_forks() {
+    let rows = [rollouts("ntp", "cleanup_unseen_1_20", 5, 10), rollouts("ntp", "cleanup_unseen_4_5", 10, 10)];
+    let run = Run::new(&rows.concat());
+    let report = run.make();
+    let cells: Vec<_> = report.grids[0].cells.iter().map(|cell| (cell.bowls, cell.forks, cell.success_rate)).collect();
+    assert_eq!(cells, [(1, 20, 0.5), (4, 5, 1.0)]);
+    assert!(run.text("index.html").contains("--shade: 50%\" title=\"10 rollouts\">50.0</td>"));
+}
+
+#[track_caller]
+fn check_claim(id: &str, rows: &[Vec<Rollout>], expected: &[(&str, Verdict)]) {
+    let report = Run::new(&rows.concat()).make();
+    let claims = report.claims.iter().filter(|claim| claim.id == id);
+    let found: Vec<_> = claims.map(|claim| (claim.encoder.as_str(), claim.verdict)).collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn an_ordering_counts_when_it_is_beyond_its_interval() {
+    let suite = "stacking_unseen";
+    let against = |flat: i64| vec![rollouts("ntp", suite, 90, 100), rollouts("flat", suite, flat, 100)];
+    check_claim("stacking_flat", &against(10), &[("object-centric", Verdict::Reproduced)]);
+    check_claim("stacking_flat", &against(90), &[("object-centric", Verdict::NoDifference)]);
+    check_claim("stacking_flat", &against(85), &[("object-centric", Verdict::NoDifference)]);
+    check_claim("stacking_flat", &against(100), &[("object-centric", Verdict::NotReproduced)]);
+    let paper = [rollouts("ntp_paper", suite, 90, 100), rollouts("flat_paper", suite, 0, 100)];
+    check_claim("stacking_flat", &paper, &[("flattened", Verdict::Reproduced)]);
+    check_claim("stacking_flat", &[rollouts("ntp", suite, 90, 100)], &[]);
+}
+
+#[test]
+fn a_claim_over_lengths_is_as_good_as_its_worst_length() {
+    let at = |four: i64, forty: i64| {
+        vec![rollouts("ntp", "sorting_unseen_4", four, 100), rollouts("ntp", "sorting_unseen_40", forty, 100)]
+    };
+    check_claim("sorting_long_tasks", &at(100, 90), &[("object-centric", Verdict::Reproduced)]);
+    check_claim("sorting_long_tasks", &at(100, 89), &[("object-centric", Verdict::NotReproduced)]);
+}
+
+#[test]
+fn losses_are_compared_as_differences_of_differences() {
+    let with = |ntp: i64, gru: i64| {
+        vec![
+            rollouts("ntp", "stacking_unseen", 100, 100),
+            rollouts("ntp", "stacking_adversary", ntp, 100),
+            rollouts("ntp_gru", "stacking_unseen", 100, 100),
+            rollouts("ntp_gru", "stacking_adversary", gru, 100),
+        ]
+    };
+    check_claim("adversary_reactive", &with(90, 40), &[("object-centric", Verdict::Reproduced)]);
+    check_claim("adversary_reactive", &with(40, 90), &[("object-centric", Verdict::NotReproduced)]);
+    check_claim("adversary_reactive", &with(90, 88), &[("object-centric", Verdict::NoDifference)]);
+}
+
+#[test]
+fn the_page_and_the_markdown_say_what_did_not_reproduce() {
+    let rows = [rollouts("ntp", "stacking_unseen", 20, 100), rollouts("flat", "stacking_unseen", 90, 100)];
+    let run = Run::new(&rows.concat());
+    run.make();
+    assert!(run.text("index.html").contains("<span class=\"verdict not_reproduced\">not reproduced</span>"));
+    assert!(run.text("report.md").contains("| **not reproduced** "));
 }

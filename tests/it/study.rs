@@ -57,6 +57,11 @@ fn a_study_runs_each_experiment_as_by_itself_and_reports_them_together() {
     assert_eq!(told, [row("one", "ntp"), row("one", "oracle"), row("two", "ntp"), row("two", "oracle")]);
     let (code, json, _) = files.run("report", "pair.toml", "out", &["--json"]);
     assert_eq!((code, serde_json::from_str::<Value>(&json).unwrap()), (0, report));
+    let out = files.path("out").to_string_lossy().into_owned();
+    let (code, told, _) = run(&["inspect", &out, "--json"]);
+    assert_eq!((code, &serde_json::from_str::<Value>(&told).unwrap()["kind"]), (0, &"study".into()));
+    let (code, told, _) = run(&["validate", &out]);
+    assert!(code == 0 && told.contains("out/two/dataset") && told.contains("out/report"), "{told}");
     let (code, markdown, _) = files.run("report", "pair.toml", "out", &[]);
     assert!(code == 0 && markdown.contains("| stacking_unseen | ntp "), "{markdown}");
 }

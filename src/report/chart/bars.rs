@@ -63,7 +63,10 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
     };
     Some(BarPlot {
         ticks: (0..=N_STEPS).map(tick).collect(),
-        keys: causes.iter().map(|cause| Key { label: cause.replace('_', " "), color: color(cause) }).collect(),
+        keys: causes
+            .iter()
+            .map(|cause| Key { label: cause.replace('_', " "), color: color(cause), hollow: false })
+            .collect(),
         suites: aggregates.chunk_by(|a, b| a.suite == b.suite).map(suite).collect(),
     })
 }

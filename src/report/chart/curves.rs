@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{coordinate, nice_step, power_of_ten, thousands};
-use crate::report::chart::{PANEL, Tick, color_of, distinct};
+use crate::report::chart::{PANEL, Tick, color_of, distinct, has_paper_encoder};
 use crate::report::metrics::{Curve, CurvePoint, PARTS};
 
 /// No decade below this is drawn: what is smaller lies on the axis.
@@ -12,6 +12,7 @@ const LOWEST_EXPONENT: i32 = -6;
 /// Panels of one part of the loss, with the same axes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct CurveGrid {
+    pub(in crate::report) experiment: String,
     pub(in crate::report) part: String,
     pub(in crate::report) panels: Vec<CurvePanel>,
 }
@@ -29,6 +30,7 @@ pub(in crate::report) struct CurvePanel {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct Line {
     pub(in crate::report) color: usize,
+    pub(in crate::report) dashed: bool,
     /// An SVG path.
     pub(in crate::report) path: String,
     pub(in crate::report) tip: String,
@@ -41,19 +43,33 @@ struct Axes {
     high: i32,
 }
 
-/// A grid for each part of the loss that was recorded, the total first.
+/// A grid for each part of the loss that was recorded, the total first, in each experiment: levels of the same name
+/// learn other things there.
 pub(in crate::report) fn grids(curves: &[Curve]) -> Vec<CurveGrid> {
-    let grids = (0..PARTS.len()).filter_map(|part| {
-        let axes = axes(curves, part)?;
-        let levels = distinct(curves.iter().map(|curve| &curve.level));
-        let panels = levels.iter().map(|level| panel(curves, part, level, &axes));
-        let panels = panels.filter(|panel| !panel.lines.is_empty()).collect();
-        Some(CurveGrid { part: PARTS[part].trim_start_matches("loss_").to_owned(), panels })
-    });
-    grids.collect()
+    let mut experiments = distinct(curves.iter().map(|curve| &curve.model.experiment));
+    experiments.sort();
+    let of_part = |part: usize| {
+        let grid = |name: &String| {
+            let own: Vec<&Curve> = curves.iter().filter(|curve| curve.model.experiment == *name).collect();
+            grid(&own, part, name)
+        };
+        experiments.iter().filter_map(grid).collect::<Vec<_>>()
+    };
+    (0..PARTS.len()).flat_map(of_part).collect()
 }
 
-fn axes(curves: &[Curve], part: usize) -> Option<Axes> {
+fn grid(curves: &[&Curve], part: usize, experiment: &str) -> Option<CurveGrid> {
+    let axes = axes(curves, part)?;
+    let levels = distinct(curves.iter().map(|curve| &curve.level));
+    let panels = levels.iter().map(|level| panel(curves, part, level, &axes));
+    Some(CurveGrid {
+        experiment: experiment.to_owned(),
+        part: PARTS[part].trim_start_matches("loss_").to_owned(),
+        panels: panels.filter(|panel| !panel.lines.is_empty()).collect(),
+    })
+}
+
+fn axes(curves: &[&Curve], part: usize) -> Option<Axes> {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let losses = || points().filter_map(|point| point.losses[part]).filter(|&loss| loss > 0.0);
     let low = losses().reduce(f64::min)?.log10().floor() as i32;
@@ -63,7 +79,7 @@ fn axes(curves: &[Curve], part: usize) -> Option<Axes> {
     Some(Axes { last_step, low, high: high.max(low + 1) })
 }
 
-fn panel(curves: &[Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel {
+fn panel(curves: &[&Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel {
     let line = |curve: &Curve| {
         let model = &curve.model;
         let path = path(&curve.points, part, axes);
@@ -72,7 +88,7 @@ fn panel(curves: &[Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel 
             "{}, {} tasks, training seed {}: {last:.4} in the end",
             model.variant, model.train_tasks, model.seed
         );
-        Some(Line { color: color_of(&model.variant), path, tip })
+        Some(Line { color: color_of(&model.variant), dashed: has_paper_encoder(&model.variant), path, tip })
     };
     let step = nice_step(axes.last_step, 4.0);
     let x_tick = |mark: usize| {
@@ -86,7 +102,7 @@ fn panel(curves: &[Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel 
         title: level.to_owned(),
         x_ticks: (0..=(axes.last_step / step) as usize).map(x_tick).collect(),
         y_ticks: (axes.low..=axes.high).step_by(stride).map(y_tick).collect(),
-        lines: curves.iter().filter(|curve| curve.level == level).filter_map(line).collect(),
+        lines: curves.iter().copied().filter(|curve| curve.level == level).filter_map(line).collect(),
     }
 }
 

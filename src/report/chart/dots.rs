@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
-use crate::report::chart::{Tick, color_of};
+use crate::report::chart::{Tick, color_of, has_paper_encoder};
 use crate::report::page::{name_of, title_of};
 use crate::report::summary::{Aggregate, SuiteResult};
 
@@ -34,6 +34,7 @@ pub(in crate::report) struct DotSuite {
 pub(in crate::report) struct DotRow {
     pub(in crate::report) name: String,
     pub(in crate::report) color: usize,
+    pub(in crate::report) hollow: bool,
     pub(in crate::report) mean_at: String,
     pub(in crate::report) low_at: String,
     pub(in crate::report) high_at: String,
@@ -62,6 +63,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
         DotRow {
             name: name_of(&row.actor),
             color: color_of(&row.actor.variant),
+            hollow: has_paper_encoder(&row.actor.variant),
             mean_at: at(row.mean_success_rate),
             low_at: at(row.wilson_low),
             high_at: at(row.wilson_high),

@@ -5,11 +5,13 @@ use serde::Serialize;
 use crate::report::chart::scale::{coordinate, nice_step, thousands};
 use crate::report::chart::{Key, PANEL, Tick, distinct};
 use crate::report::order;
-use crate::report::summary::{Aggregate, Divergence};
+use crate::report::summary::{Aggregate, Divergence, FirstError};
 
 /// What can differ, and its colour.
 pub(in crate::report) const KINDS: [(&str, usize); 5] =
     [("program", 6), ("argument", 5), ("scope", 0), ("early_end", 3), ("late_end", 1)];
+/// The error of a rollout that decided nothing wrongly before physics went wrong.
+const PHYSICS: &str = "physics";
 /// Most bars of a panel.
 const MAX_BINS: i64 = 24;
 /// Fewer bars would be slabs.
@@ -66,12 +68,19 @@ pub(in crate::report) struct Cell {
 }
 
 /// Nothing when no failed rollout diverged.
-pub(in crate::report) fn plot(divergences: &[Divergence], aggregates: &[Aggregate]) -> Option<Histograms> {
+pub(in crate::report) fn plot(
+    divergences: &[Divergence],
+    errors: &[FirstError],
+    aggregates: &[Aggregate],
+) -> Option<Histograms> {
     let mut variants = distinct(divergences.iter().map(|divergence| &divergence.variant));
     variants.sort_by_cached_key(|variant| order::variant(variant));
-    let panels: Vec<Histogram> =
-        variants.iter().filter_map(|variant| panel(divergences, aggregates, variant)).collect();
-    let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color };
+    let panel = |variant: &String| {
+        let histogram = panel(divergences, aggregates, variant)?;
+        Some(Histogram { programs: programs(errors, variant), ..histogram })
+    };
+    let panels: Vec<Histogram> = variants.iter().filter_map(panel).collect();
+    let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color, hollow: false };
     (!panels.is_empty()).then(|| Histograms { keys: KINDS.into_iter().map(key).collect(), panels })
 }
 
@@ -88,7 +97,7 @@ fn panel(divergences: &[Divergence], aggregates: &[Aggregate], variant: &str) ->
         x_ticks: bins.x_ticks(),
         y_ticks: bins.y_ticks(),
         bars: bins.bars(),
-        programs: programs(&failures),
+        programs: Vec::new(),
     })
 }
 
@@ -169,17 +178,25 @@ fn bin_name(bin: i64, per_bin: i64) -> String {
     }
 }
 
-fn programs(failures: &[&Divergence]) -> Vec<ProgramRow> {
-    let mut names = distinct(failures.iter().map(|one| &one.program));
+/// Failed rollouts by the program that was wrong first, and in what; physics in a row and a column of its own.
+fn programs(errors: &[FirstError], variant: &str) -> Vec<ProgramRow> {
+    let own: Vec<&FirstError> = errors.iter().filter(|error| error.actor.variant == variant).collect();
+    let mut names = distinct(own.iter().filter_map(|error| error.program.as_ref()));
     names.sort_by_cached_key(|program| order::level(program));
-    let count = |program: &str, kind: &str| -> u64 {
-        failures.iter().filter(|one| one.program == program && one.kind == kind).map(|one| one.episodes).sum()
+    let mut rows: Vec<(Option<&String>, &str)> = names.iter().map(|name| (Some(name), name.as_str())).collect();
+    if own.iter().any(|error| error.program.is_none()) {
+        rows.push((None, PHYSICS));
+    }
+    let columns = || KINDS.into_iter().map(|(kind, _)| kind).chain([PHYSICS]);
+    let count = |program: Option<&String>, kind: &str| -> u64 {
+        own.iter().filter(|one| one.program.as_ref() == program && one.error == kind).map(|one| one.episodes).sum()
     };
-    let highest = names.iter().flat_map(|name| KINDS.map(|(kind, _)| count(name, kind))).max().unwrap_or(0).max(1);
+    let highest = rows.iter().flat_map(|(program, _)| columns().map(|kind| count(*program, kind))).max();
+    let highest = highest.unwrap_or(0).max(1);
     let cell = |count: u64| Cell { count, shade: 100 * count / highest };
-    let row = |name: &String| ProgramRow {
-        program: name.clone(),
-        cells: KINDS.map(|(kind, _)| cell(count(name, kind))).to_vec(),
+    let row = |(program, name): &(Option<&String>, &str)| ProgramRow {
+        program: (*name).to_owned(),
+        cells: columns().map(|kind| cell(count(*program, kind))).collect(),
     };
-    names.iter().map(row).collect()
+    rows.iter().map(row).collect()
 }

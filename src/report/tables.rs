@@ -1,0 +1,156 @@
+//! The page's smaller tables: the adversary, clean-up by bowls and forks, models, costs.
+
+use serde::Serialize;
+
+use crate::report::chart::scale::{percent, thousands};
+use crate::report::chart::{color_of, distinct};
+use crate::report::figures::{Figure, Grid, Series};
+use crate::report::summary::{ModelSummary, StageCost};
+
+/// Success without an adversary and with one that pushes after a quarter of the placements.
+#[derive(Serialize)]
+pub(super) struct AdversaryRow {
+    variant: String,
+    color: usize,
+    without: String,
+    with: String,
+    loss: String,
+    paper: Option<(String, String, String)>,
+}
+
+/// The paper's table "Adversarial Dynamics" from the figure of that name.
+pub(super) fn adversary(figures: &[Figure]) -> Vec<AdversaryRow> {
+    let figure = figures.iter().find(|figure| figure.id == "stacking_adversary");
+    let series = figure.map(|figure| figure.series.as_slice()).unwrap_or_default();
+    series.iter().filter_map(adversary_row).collect()
+}
+
+fn adversary_row(series: &Series) -> Option<AdversaryRow> {
+    let ours = |x| series.ours.iter().find(|point| point.x == x).map(|point| point.success_rate);
+    let paper = |x| series.paper.iter().find(|point| point.x == x).map(|point| point.success_rate);
+    let (without, with) = (ours(0)?, ours(25)?);
+    let told = |without: f64, with: f64| (percent(without), percent(with), loss(without, with));
+    let (ours_without, ours_with, ours_loss) = told(without, with);
+    Some(AdversaryRow {
+        variant: series.variant.clone(),
+        color: color_of(&series.variant),
+        without: ours_without,
+        with: ours_with,
+        loss: ours_loss,
+        paper: paper(0).zip(paper(25)).map(|(without, with)| told(without, with)),
+    })
+}
+
+/// A loss in percentage points, with a true minus sign.
+fn loss(before: f64, after: f64) -> String {
+    let points = 100.0 * (after - before);
+    let sign = if points < 0.0 { "\u{2212}" } else { "+" };
+    format!("{sign}{:.1}", points.abs())
+}
+
+/// Success by bowls (rows) and forks (columns).
+#[derive(Serialize)]
+pub(super) struct HeatGrid {
+    variant: String,
+    forks: Vec<i64>,
+    rows: Vec<HeatRow>,
+}
+
+#[derive(Serialize)]
+struct HeatRow {
+    bowls: i64,
+    cells: Vec<Option<HeatCell>>,
+}
+
+#[derive(Serialize)]
+struct HeatCell {
+    value: String,
+    /// Percent of the colour.
+    shade: u64,
+    episodes: u64,
+}
+
+/// One table a variant.
+pub(super) fn heat(grids: &[Grid]) -> Vec<HeatGrid> {
+    grids.iter().map(heat_grid).collect()
+}
+
+fn heat_grid(grid: &Grid) -> HeatGrid {
+    let sorted = |mut values: Vec<i64>| {
+        values.sort_unstable();
+        values.dedup();
+        values
+    };
+    let forks = sorted(grid.cells.iter().map(|cell| cell.forks).collect());
+    let bowls = sorted(grid.cells.iter().map(|cell| cell.bowls).collect());
+    let cell = |bowls: i64, forks: i64| {
+        let cell = grid.cells.iter().find(|cell| (cell.bowls, cell.forks) == (bowls, forks))?;
+        let shade = (100.0 * cell.success_rate).round() as u64;
+        Some(HeatCell { value: percent(cell.success_rate), shade, episodes: cell.episodes })
+    };
+    let row = |bowls: i64| HeatRow { bowls, cells: forks.iter().map(|&forks| cell(bowls, forks)).collect() };
+    HeatGrid { variant: grid.variant.clone(), rows: bowls.into_iter().map(row).collect(), forks: forks.clone() }
+}
+
+/// The models of one variant and number of tasks.
+#[derive(Serialize)]
+pub(super) struct ModelRow {
+    experiment: String,
+    variant: String,
+    color: usize,
+    tasks: String,
+    seeds: usize,
+    parameters: String,
+    /// CPU-seconds of a training, on average.
+    cpu_secs: Option<String>,
+}
+
+/// One row for all seeds of a model. They stand together, as pipeline files list them.
+pub(super) fn models(models: &[ModelSummary]) -> Vec<ModelRow> {
+    let same = |a: &ModelSummary, b: &ModelSummary| {
+        (&a.experiment, &a.variant, a.train_tasks) == (&b.experiment, &b.variant, b.train_tasks)
+    };
+    models.chunk_by(same).map(model_row).collect()
+}
+
+fn model_row(seeds: &[ModelSummary]) -> ModelRow {
+    let known: Vec<f64> = seeds.iter().filter_map(|model| model.cpu_secs).collect();
+    let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+    ModelRow {
+        experiment: seeds[0].experiment.clone(),
+        variant: seeds[0].variant.clone(),
+        color: color_of(&seeds[0].variant),
+        tasks: thousands(seeds[0].train_tasks.max(0) as u64),
+        seeds: seeds.len(),
+        parameters: thousands(seeds[0].parameters),
+        cpu_secs: (!known.is_empty()).then(|| format!("{mean:.0}")),
+    }
+}
+
+/// What an experiment took.
+#[derive(Serialize)]
+pub(super) struct CostRow {
+    experiment: String,
+    /// CPU-seconds by stage.
+    stages: Vec<String>,
+    cpu_mins: String,
+    wall_mins: String,
+}
+
+/// The stages that cost anything, and one row an experiment.
+pub(super) fn costs(costs: &[StageCost]) -> (Vec<String>, Vec<CostRow>) {
+    let stages = distinct(costs.iter().map(|cost| &cost.stage));
+    let row = |own: &[StageCost]| {
+        let of = |stage: &String| own.iter().find(|cost| cost.stage == *stage).map_or(0.0, |cost| cost.cpu_secs);
+        let cpu_secs: f64 = own.iter().map(|cost| cost.cpu_secs).sum();
+        let wall_secs: f64 = own.iter().map(|cost| cost.wall_secs).sum();
+        CostRow {
+            experiment: own[0].experiment.clone(),
+            stages: stages.iter().map(|stage| format!("{:.0}", of(stage))).collect(),
+            cpu_mins: format!("{:.1}", cpu_secs / 60.0),
+            wall_mins: format!("{:.1}", wall_secs / 60.0),
+        }
+    };
+    let rows = costs.chunk_by(|a, b| a.experiment == b.experiment).map(row).collect();
+    (stages, rows)
+}
