@@ -37,7 +37,8 @@ use sha2::{Digest as _, Sha256};
 use crate::artifact::{self, IoError};
 use crate::dataset::DatasetTrials;
 use crate::model::{
-    CONFIG_FILE, ModelConfig, ModelError, Network, NetworkUse, WEIGHTS_FILE, weights_to_bytes, with_network,
+    Architecture, CONFIG_FILE, ModelConfig, ModelError, Network, NetworkUse, WEIGHTS_FILE, weights_to_bytes,
+    with_network,
 };
 use crate::seed::Seed;
 use crate::table::TableError;
@@ -163,7 +164,10 @@ pub fn train(
     let family = family(data)?;
     let written =
         serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let model = ModelConfig::new(training.variant, family, data.n_slots, written);
+    let mut model = ModelConfig::new(training.variant, family, data.n_slots, written);
+    if training.variant.architecture() == Architecture::Npi {
+        model.tasks = Examples::new(data)?.task_ids();
+    }
     let device = Device::flex().autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
     let learning = Learning { config: &training.config, data, model: &model, folder, seed, hooks };

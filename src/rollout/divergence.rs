@@ -69,7 +69,7 @@ pub(super) fn expected_of(decisions: Decisions, demonstration: &Episode, scene: 
     let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
     match decisions {
         Decisions::Scoped => calls.cloned().collect(),
-        Decisions::Unscoped => calls.cloned().map(unscoped).collect(),
+        Decisions::Unscoped | Decisions::Arguments => calls.cloned().map(unscoped).collect(),
         Decisions::Primitives => {
             let end_of_program = |call: &ProgramCall| call.program == Program::None;
             let decided = calls.filter(|call| !call.program.is_composite());

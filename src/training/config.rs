@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{EncoderKind, Variant};
+use crate::model::{Architecture, EncoderKind, Variant};
 use crate::training::TrainError;
 
 /// What is trained, and how.
@@ -26,6 +26,8 @@ impl Training {
             EncoderKind::ObjectCentric => (0.003, 0.0, 0.2),
             EncoderKind::Flattened => (0.002, 1.0, 0.0),
         };
+        // What a task does to which slot stands in the weights of a model without a specification.
+        let relabel_slots = if self.variant.architecture() == Architecture::Npi { 0.0 } else { relabel_slots };
         let config = TrainConfig {
             learning_rate: self.config.learning_rate.or(Some(learning_rate)),
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),

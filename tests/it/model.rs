@@ -3,9 +3,9 @@
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    CONFIG_FILE, Cell, Decisions, Decoder, Flattened, FlattenedConfig, Gru, LabelScores, Lstm, ModelConfig, ModelError,
-    Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory, ScopeHead, Variant,
-    WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
+    CONFIG_FILE, Cell, Decisions, Decoder, Flattened, FlattenedConfig, Given, Gru, LabelScores, Lstm, ModelConfig,
+    ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory, ScopeHead,
+    Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
@@ -65,7 +65,7 @@ struct Said {
 
 fn say(network: &impl Network, n_slots: usize, windows: &[&[f32]], states: &[f32], program: Program) -> Said {
     let demonstration = network.demonstration(&Windows::new(n_slots, windows));
-    let reading = network.read(&demonstration, states);
+    let reading = network.read(&demonstration, states, &vec![Given::default(); windows.len()]);
     let (core, _) = network.core(&reading, program, &[windows.len()], None);
     Said {
         programs: values(core.programs.clone()),
@@ -161,7 +161,7 @@ impl NetworkUse for Padding {
         assert_near(&together.programs[..Program::ALL.len()], &alone.programs);
         assert_near(&together.ends[..1], &alone.ends);
         assert_near(&together.scopes[..alone.scopes.len()], &alone.scopes);
-        assert_near(&together.arguments[..8], &alone.arguments);
+        assert_near(&together.arguments[..alone.arguments.len()], &alone.arguments);
     }
 }
 
@@ -180,14 +180,14 @@ impl NetworkUse for Packing {
         let (window, states) = (rows(5, 8, 1), rows(4, 8, 3));
         // Rows 0, 2 and 3 are the first call's, row 1 the second's.
         let demonstration = network.demonstration(&Windows::new(8, &[window.as_slice(); 4]));
-        let reading = network.read(&demonstration, &states);
+        let reading = network.read(&demonstration, &states, &[Given::default(); 4]);
         let (packed, _) = network.core(&reading, Program::Pick, &[2, 1, 1], None);
         let packed = values(packed.programs);
         let mut recall = None;
         let mut alone = Vec::new();
         for step in [0, 2, 3] {
             let demonstration = network.demonstration(&Windows::new(8, &[&window]));
-            let reading = network.read(&demonstration, &states[step * 26..(step + 1) * 26]);
+            let reading = network.read(&demonstration, &states[step * 26..(step + 1) * 26], &[Given::default()]);
             let (core, remembered) = network.core(&reading, Program::Pick, &[1], recall.take());
             recall = Some(remembered);
             let programs = values(core.programs);
@@ -195,7 +195,11 @@ impl NetworkUse for Packing {
             alone.push(programs);
         }
         let (afresh, _) = network.core(
-            &network.read(&network.demonstration(&Windows::new(8, &[&window])), &states[2 * 26..3 * 26]),
+            &network.read(
+                &network.demonstration(&Windows::new(8, &[&window])),
+                &states[2 * 26..3 * 26],
+                &[Given::default()],
+            ),
             Program::Pick,
             &[1],
             None,
@@ -252,7 +256,7 @@ fn a_cut_demonstration_reads_as_its_part_alone() {
     let state = rows(1, 8, 5);
     let demonstration = network.demonstration(&Windows::new(8, &[&all]));
     let window = Ntp::<ObjectCentric>::window(&demonstration, Span { begin: 2, end: 6 });
-    let reading = network.read(&window, &state);
+    let reading = network.read(&window, &state, &[Given::default()]);
     let (core, _) = network.core(&reading, Program::PickAndPlace, &[1], None);
     let cut = values(network.scope(&reading, Program::PickAndPlace, &core).unwrap());
     let alone = say(&network, 8, &[&all[2 * 26..6 * 26]], &state, Program::PickAndPlace);

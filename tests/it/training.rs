@@ -81,8 +81,11 @@ fn labels_of_stacking_are_the_demonstrations_spans() {
     assert_eq!((second[0].window, second[0].scope, second[0].end_of_program), (span(4, 9), Some(span(0, 3)), false));
     assert_eq!((second[1].callee, second[1].scope, second[1].end_of_program), (Program::Place, Some(span(2, 5)), true));
     let picks = labels(Program::Pick);
-    assert_eq!((picks[0].argument, picks[0].window, picks[0].scope), (Some(SlotIndex(1)), span(0, 3), None));
-    assert_eq!((picks[1].callee, picks[1].argument, picks[1].next_move), (Program::Grip, None, None));
+    assert_eq!(
+        (picks[0].arguments.as_slice(), picks[0].window, picks[0].scope),
+        ([SlotIndex(1)].as_slice(), span(0, 3), None)
+    );
+    assert_eq!((picks[1].callee, picks[1].arguments.len(), picks[1].next_move), (Program::Grip, 0, None));
     assert_eq!(picks[2].next_move, Some(SlotIndex(2)));
 }
 
@@ -96,7 +99,10 @@ fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
     while data.trials[run[0].trial].task_id != "b" {
         run = examples.draw(0, Pairing::Cross, &mut rng);
     }
-    let seen: Vec<_> = run.iter().map(|step| (step.callee, step.argument, step.frame, step.end_of_program)).collect();
+    let seen: Vec<_> = run
+        .iter()
+        .map(|step| (step.callee, step.arguments.first().copied(), step.frame, step.end_of_program))
+        .collect();
     let slot = |slot| Some(SlotIndex(slot));
     assert_eq!(
         seen,
@@ -160,7 +166,7 @@ fn sub_tasks_are_matched_by_what_they_do_when_counts_differ() {
     assert_eq!([scope(2, 1), scope(3, 1)], [Some(span(8, 13)); 2], "of several alike the first is meant");
     let call = decisions(&data, 1, Program::Drop)[2 * 3];
     let drop = examples.example(1, call, 0).unwrap();
-    assert_eq!((drop.window, drop.argument), (span(6, 9), Some(SlotIndex(6))));
+    assert_eq!((drop.window, drop.arguments), (span(6, 9), vec![SlotIndex(6)]));
 }
 
 #[test]
