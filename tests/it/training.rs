@@ -132,6 +132,27 @@ fn without_scopes_every_program_learns_from_the_whole_demonstration() {
 }
 
 #[test]
+fn npi_learns_what_programs_are_called_with() {
+    let data = towers();
+    let examples = Examples::of(&data, Decisions::Arguments, Grain::Call).unwrap();
+    assert_eq!(examples.task_ids(), ["a", "b"]);
+    let of = |program: Program| -> Example {
+        let trial = data.trials.iter().position(|trial| trial.task_id == "b").unwrap();
+        examples.example(trial, decisions(&data, trial, program)[0], trial).unwrap()
+    };
+    let slots = |slots: [u16; 2]| slots.map(SlotIndex);
+    let root = of(Program::BlockStacking);
+    assert_eq!((root.given.task, root.given.arguments), (Some(1), [None, None]));
+    assert_eq!(root.arguments, slots([3, 5]));
+    let below = of(Program::PickAndPlace);
+    assert_eq!((below.given.task, below.given.arguments), (None, slots([3, 5]).map(Some)));
+    assert_eq!((below.callee, below.arguments.as_slice()), (Program::Pick, &slots([3, 5])[..1]));
+    let lowest = of(Program::Place);
+    assert_eq!(lowest.given.arguments, [Some(SlotIndex(5)), None]);
+    assert_eq!((lowest.callee, lowest.arguments.as_slice()), (Program::MoveTo, &slots([5, 3])[..1]));
+}
+
+#[test]
 fn the_steps_of_a_call_are_packed_step_by_step() {
     let data = towers();
     let examples = Examples::of(&data, Decisions::Scoped, Grain::Call).unwrap();
