@@ -239,15 +239,15 @@ impl Run<'_> {
             Resumed { learner, standing: Standing { step: 0, examples: 0, errors, metrics: Vec::new() } }
         });
         let resumed_at = standing.step;
-        while standing.step < self.config.steps {
+        while standing.step < self.config.n_steps() {
             if (hooks.should_stop)() {
                 checkpoints.save(&learner, &standing)?;
                 return Err(TrainError::Stopped { step: standing.step });
             }
             let loss;
             (learner, loss) = self.step(learner, &mut standing);
-            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.steps, loss });
-            if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.steps {
+            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.n_steps(), loss });
+            if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.n_steps() {
                 checkpoints.save(&learner, &standing)?;
             }
         }
@@ -283,7 +283,7 @@ impl Run<'_> {
             total += losses.total;
             standing.examples += size as u64;
             standing.errors.update(level, losses.total);
-            if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.steps {
+            if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.n_steps() {
                 let program = levels[level].0;
                 standing.metrics.push(Metric::new(standing.step, program, losses, learning_rate, size as u32));
             }

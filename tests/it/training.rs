@@ -269,7 +269,7 @@ fn weights(training: &Training, data: &DatasetTrials) -> Vec<u8> {
 }
 
 fn short() -> TrainConfig {
-    TrainConfig { steps: 6, batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
+    TrainConfig { steps: Some(6), batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
 }
 
 #[test]
@@ -290,7 +290,7 @@ fn forty_steps_are_twenty_and_twenty_more() {
     let data = towers();
     for curriculum in [Curriculum::Equal, Curriculum::Adaptive] {
         let config =
-            ntp(TrainConfig { steps: 40, batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() });
+            ntp(TrainConfig { steps: Some(40), batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() });
         let (straight, resumed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let whole = train_until(&config, &data, straight.path(), None).unwrap();
         let stopped = train_until(&config, &data, resumed.path(), Some(20)).unwrap_err();
@@ -356,7 +356,7 @@ fn data_and_settings_that_make_no_sense_are_refused() {
     let mut mixed = towers();
     mixed.trials.extend(demonstrations(&[sorting("m", [0, 1, 2, 3], Split::Seen)], 1).trials);
     assert!(matches!(refused(&config, &mixed), TrainError::MixedFamilies { .. }));
-    let none = TrainConfig { steps: 0, ..config.clone() };
+    let none = TrainConfig { steps: Some(0), ..config.clone() };
     assert!(matches!(refused(&none, &towers()), TrainError::Config { key: "steps", .. }));
     let much = TrainConfig { gripper_jitter: Some(1.5), ..config };
     let error = refused(&much, &towers()).to_string();
@@ -389,7 +389,7 @@ fn a_short_training_stacks_unseen_towers() {
     let set = sample(Family::BlockStacking, 20, 20, Seed(3)).unwrap();
     let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
     let folder = tempfile::tempdir().unwrap();
-    let config = TrainConfig { steps: 300, gripper_jitter: Some(0.0), ..TrainConfig::default() };
+    let config = TrainConfig { steps: Some(300), gripper_jitter: Some(0.0), ..TrainConfig::default() };
     let summary = train_until(&ntp(config), &demonstrations(&seen, 10), folder.path(), None).unwrap();
     let (first, root) = (&summary.metrics[0], last(&summary.metrics, Program::BlockStacking));
     assert!(root.loss_total < 0.1 * first.loss_total, "{} of {}", root.loss_total, first.loss_total);
