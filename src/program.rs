@@ -92,6 +92,15 @@ impl Program {
         !self.is_primitive() && self != Self::None
     }
 
+    /// How many slots it is about: what is moved and where to, where a call has to name them both.
+    pub fn n_slots(self) -> usize {
+        match self {
+            Self::None | Self::BlockStacking | Self::ObjectSorting | Self::Grip | Self::Release => 0,
+            Self::Pick | Self::Place | Self::Drop | Self::MoveTo => 1,
+            Self::PickAndPlace | Self::PickAndDrop => 2,
+        }
+    }
+
     /// Whether a call takes a slot as its argument.
     pub fn takes_argument(self) -> bool {
         self == Self::MoveTo

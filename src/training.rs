@@ -38,7 +38,8 @@ use sha2::{Digest as _, Sha256};
 use crate::artifact::{self, IoError};
 use crate::dataset::DatasetTrials;
 use crate::model::{
-    CONFIG_FILE, ModelConfig, ModelError, Network, NetworkUse, WEIGHTS_FILE, weights_to_bytes, with_network,
+    Architecture, CONFIG_FILE, ModelConfig, ModelError, Network, NetworkUse, WEIGHTS_FILE, weights_to_bytes,
+    with_network,
 };
 use crate::seed::Seed;
 use crate::table::TableError;
@@ -164,7 +165,10 @@ pub fn train(
     let family = family(data)?;
     let written =
         serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let model = ModelConfig::new(training.variant, family, data.n_slots, written);
+    let mut model = ModelConfig::new(training.variant, family, data.n_slots, written);
+    if training.variant.architecture() == Architecture::Npi {
+        model.tasks = Examples::new(data)?.task_ids();
+    }
     let device = Device::flex().autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
     let learning = Learning { config: &training.config, data, model: &model, folder, seed, hooks };
@@ -236,15 +240,15 @@ impl Run<'_> {
             Resumed { learner, standing: Standing { step: 0, examples: 0, errors, metrics: Vec::new() } }
         });
         let resumed_at = standing.step;
-        while standing.step < self.config.steps {
+        while standing.step < self.config.n_steps() {
             if (hooks.should_stop)() {
                 checkpoints.save(&learner, &standing)?;
                 return Err(TrainError::Stopped { step: standing.step });
             }
             let loss;
             (learner, loss) = self.step(learner, &mut standing);
-            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.steps, loss });
-            if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.steps {
+            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.n_steps(), loss });
+            if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.n_steps() {
                 checkpoints.save(&learner, &standing)?;
             }
         }
@@ -280,7 +284,7 @@ impl Run<'_> {
             total += losses.total;
             standing.examples += size as u64;
             standing.errors.update(level, losses.total);
-            if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.steps {
+            if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.n_steps() {
                 let program = levels[level].0;
                 standing.metrics.push(Metric::new(standing.step, program, losses, learning_rate, size as u32));
             }

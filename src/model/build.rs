@@ -6,6 +6,7 @@ use crate::model::config::{ModelConfig, NetworkConfig};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::Flattened;
 use crate::model::network::Network;
+use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
 use crate::model::object_centric::ObjectCentric;
 use crate::model::programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope};
 use crate::model::variant::Architecture;
@@ -23,12 +24,14 @@ pub trait NetworkUse {
 /// Makes a fresh network as configured and hands it on; the same seed gives the same parameters.
 pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &Device, wanted: U) -> U::Output {
     match &config.network {
-        NetworkConfig::ObjectCentric(widths) => of_encoder::<ObjectCentric, U>(config, widths, seed, device, wanted),
-        NetworkConfig::Flattened(widths) => of_encoder::<Flattened, U>(config, widths, seed, device, wanted),
+        NetworkConfig::ObjectCentric(widths) => {
+            of_encoder::<ObjectCentric, BySlot, U>(config, widths, seed, device, wanted)
+        }
+        NetworkConfig::Flattened(widths) => of_encoder::<Flattened, ByVector, U>(config, widths, seed, device, wanted),
     }
 }
 
-fn of_encoder<E: Encoder, U: NetworkUse>(
+fn of_encoder<E: Encoder, P: CallEncoder<Config = E::Config>, U: NetworkUse>(
     config: &ModelConfig,
     widths: &E::Config,
     seed: Seed,
@@ -41,6 +44,7 @@ fn of_encoder<E: Encoder, U: NetworkUse>(
         Architecture::NtpGru => wanted.run(NtpGru::<E>::new(widths, n_slots, seed, device)),
         Architecture::NtpNoScope => wanted.run(NtpNoScope::<E>::new(widths, n_slots, seed, device)),
         Architecture::Flat => wanted.run(Flat::<E>::new(widths, n_slots, seed, device)),
+        Architecture::Npi => wanted.run(Npi::<P>::new(widths, n_slots, config.tasks.len(), seed, device)),
         Architecture::FlatGru => wanted.run(FlatGru::<E>::new(widths, n_slots, seed, device)),
     }
 }

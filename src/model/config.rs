@@ -50,6 +50,9 @@ pub struct ModelConfig {
     pub n_slots: usize,
     /// Hash of the program vocabulary.
     pub vocabulary: String,
+    /// The tasks that it knows by name, where it knows any: those of [`Variant::Npi`], in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<String>,
     /// Widths.
     pub network: NetworkConfig,
     /// How it was trained, for people; loading does not read it.
@@ -60,7 +63,7 @@ impl ModelConfig {
     /// Version of `config.json`.
     pub const VERSION: u32 = 2;
 
-    /// A model of a variant's default widths and the current vocabulary.
+    /// A model of a variant's default widths and the current vocabulary, which knows no task by name.
     pub fn new(variant: Variant, family: Family, n_slots: usize, training: serde_json::Value) -> Self {
         Self {
             version: Self::VERSION,
@@ -68,6 +71,7 @@ impl ModelConfig {
             family,
             n_slots,
             vocabulary: vocabulary_hash(),
+            tasks: Vec::new(),
             network: NetworkConfig::of(variant),
             training,
         }

@@ -3,10 +3,20 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::model::decisions::Decisions;
+use crate::model::decisions::{Decisions, MAX_ARGUMENTS};
 use crate::model::windows::Windows;
 use crate::program::Program;
+use crate::scene::SlotIndex;
 use crate::trace::Span;
+
+/// What a running program was called with where there is no specification to tell it; other variants do not read it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Given {
+    /// For the root: which of the tasks that the model knows by name. `None` for any other.
+    pub task: Option<usize>,
+    /// The slots it was called with; none for the root.
+    pub arguments: [Option<SlotIndex>; MAX_ARGUMENTS],
+}
 
 /// What the core decides.
 #[derive(Clone, Debug)]
@@ -48,8 +58,9 @@ pub trait Network: Module + Sync + 'static {
     /// The part of a single demonstration that a program may see.
     fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
 
-    /// Encodes the demonstration and the state beside it. `states` are observation rows, one a window.
-    fn read(&self, demonstration: &Self::Demonstration, states: &[f32]) -> Self::Reading;
+    /// Encodes the demonstration and the state beside it. `states` are observation rows, one a window, and so is
+    /// `given`.
+    fn read(&self, demonstration: &Self::Demonstration, states: &[f32], given: &[Given]) -> Self::Reading;
 
     /// The next program and the end of the running one; and what the calls of the last step remember. A call's first
     /// step remembers nothing.
@@ -64,7 +75,8 @@ pub trait Network: Module + Sync + 'static {
     /// Logits of the scoping labels, `[B, T, 4]`, arbitrary beyond a window; nothing where none are decided.
     fn scope(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>>;
 
-    /// Logits of the argument over the slots, `[B, N]`.
+    /// Logits over the slots, a row for each of a decision's arguments: `[B * arguments, N]`, see
+    /// [`Decisions::n_arguments`].
     fn argument(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Tensor<2>;
 
     /// Where the parameters are.

@@ -14,7 +14,7 @@ use crate::model::decisions::Decisions;
 use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
 use crate::model::layers::{Init, repeat_row};
 use crate::model::memory::ProgramMemory;
-use crate::model::network::{CoreOutput, Network};
+use crate::model::network::{CoreOutput, Given, Network};
 use crate::model::scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
 use crate::model::windows::Windows;
 use crate::program::Program;
@@ -83,7 +83,7 @@ impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argumen
         E::window(demonstration, span)
     }
 
-    fn read(&self, demonstration: &E::Demonstration, states: &[f32]) -> E::Reading {
+    fn read(&self, demonstration: &E::Demonstration, states: &[f32], _given: &[Given]) -> E::Reading {
         self.encoder.read(demonstration, states)
     }
 

@@ -31,6 +31,11 @@ pub enum Variant {
     FlatGru,
     /// The same with the paper's encoder.
     FlatGruPaper,
+    /// The Neural Programmer-Interpreter: an LSTM core, and program arguments in place of a demonstration. It knows
+    /// the tasks that it was trained on by name, and no other.
+    Npi,
+    /// The same with observations as one vector.
+    NpiPaper,
 }
 
 /// The parts of a network, but for its encoder.
@@ -46,6 +51,8 @@ pub enum Architecture {
     Flat,
     /// [`super::FlatGru`]
     FlatGru,
+    /// [`super::Npi`]
+    Npi,
 }
 
 /// How observations and demonstrations are read.
@@ -59,7 +66,7 @@ pub enum EncoderKind {
 
 impl Variant {
     /// Every variant.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Ntp,
         Self::NtpPaper,
         Self::NtpGru,
@@ -70,6 +77,8 @@ impl Variant {
         Self::FlatPaper,
         Self::FlatGru,
         Self::FlatGruPaper,
+        Self::Npi,
+        Self::NpiPaper,
     ];
 
     /// The name in files and reports.
@@ -85,6 +94,8 @@ impl Variant {
             Self::FlatPaper => "flat_paper",
             Self::FlatGru => "flat_gru",
             Self::FlatGruPaper => "flat_gru_paper",
+            Self::Npi => "npi",
+            Self::NpiPaper => "npi_paper",
         }
     }
 
@@ -96,16 +107,22 @@ impl Variant {
             Self::NtpNoScope | Self::NtpNoScopePaper => Architecture::NtpNoScope,
             Self::Flat | Self::FlatPaper => Architecture::Flat,
             Self::FlatGru | Self::FlatGruPaper => Architecture::FlatGru,
+            Self::Npi | Self::NpiPaper => Architecture::Npi,
         }
     }
 
     /// Its encoder.
     pub fn encoder(self) -> EncoderKind {
         match self {
-            Self::Ntp | Self::NtpGru | Self::NtpNoScope | Self::Flat | Self::FlatGru => EncoderKind::ObjectCentric,
-            Self::NtpPaper | Self::NtpGruPaper | Self::NtpNoScopePaper | Self::FlatPaper | Self::FlatGruPaper => {
-                EncoderKind::Flattened
+            Self::Ntp | Self::NtpGru | Self::NtpNoScope | Self::Flat | Self::FlatGru | Self::Npi => {
+                EncoderKind::ObjectCentric
             }
+            Self::NtpPaper
+            | Self::NtpGruPaper
+            | Self::NtpNoScopePaper
+            | Self::FlatPaper
+            | Self::FlatGruPaper
+            | Self::NpiPaper => EncoderKind::Flattened,
         }
     }
 }

@@ -46,8 +46,8 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let spec = &context.pipeline.spec.models[model];
     let trials = training_trials(context, spec)?;
     unit.dir.begin(&unit.plan)?;
-    let progress = context.progress(unit, u64::from(spec.training.steps), "steps");
-    let training = Training { variant: spec.variant, seed, config: spec.training.clone() };
+    let training = Training { variant: spec.variant, seed, config: spec.training.clone() }.resolved();
+    let progress = context.progress(unit, u64::from(training.config.n_steps()), "steps");
     let mut shown = 0;
     let mut on_progress = |now: training::Progress| {
         progress.inc(u64::from(now.step - shown));

@@ -73,7 +73,7 @@ pub(super) fn decided_of(decisions: Decisions, whole: Option<Span>, calls: &[Pro
     let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
     match decisions {
         Decisions::Scoped => calls.to_vec(),
-        Decisions::Unscoped => calls.iter().cloned().map(unscoped).collect(),
+        Decisions::Unscoped | Decisions::Arguments => calls.iter().cloned().map(unscoped).collect(),
         Decisions::Primitives => {
             let end_of_program = |call: &ProgramCall| call.program == Program::None;
             let decided = calls.iter().filter(|call| !call.program.is_composite());

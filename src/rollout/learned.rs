@@ -18,7 +18,8 @@ use rayon::iter::{
 };
 
 use crate::model::{
-    self, CoreOutput, Decisions, Decoder, LabelScores, ModelConfig, ModelError, Network, NetworkUse, Windows,
+    self, CoreOutput, Decisions, Decoder, Given, LabelScores, MAX_ARGUMENTS, ModelConfig, ModelError, Network,
+    NetworkUse, Windows,
 };
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, Query, Specification};
@@ -35,7 +36,8 @@ const END_THRESHOLD: f32 = 0.5;
 /// As [`model::load`].
 pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
     let config = model::load_config(folder)?;
-    let policy = model::load(folder, &config, Deciding { name: config.variant.name(), decoder })?;
+    let deciding = Deciding { name: config.variant.name(), decoder, tasks: config.tasks.clone() };
+    let policy = model::load(folder, &config, deciding)?;
     Ok((config, policy))
 }
 
@@ -43,13 +45,14 @@ pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<
 struct Deciding {
     name: &'static str,
     decoder: Decoder,
+    tasks: Vec<String>,
 }
 
 impl NetworkUse for Deciding {
     type Output = Box<dyn Policy + Send>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        Box::new(LearnedPolicy::new(self.name, network, self.decoder))
+        Box::new(LearnedPolicy::new(self.name, network, self.decoder).knowing(self.tasks))
     }
 }
 
@@ -60,8 +63,23 @@ pub struct LearnedPolicy<N: Network> {
     decoder: Decoder,
     /// By address, which the `Arc` in the value keeps from being given to another specification.
     demonstrations: HashMap<usize, Known<N::Demonstration>>,
-    /// What the running calls of each episode remember, from the root's up.
-    stacks: HashMap<usize, Vec<Option<N::Recall>>>,
+    /// The running calls of each episode, from the root's up.
+    stacks: HashMap<usize, Vec<Running<N::Recall>>>,
+    /// The tasks that the network knows by name.
+    tasks: Vec<String>,
+}
+
+/// A call on an episode's stack.
+struct Running<R> {
+    given: Given,
+    /// What it remembers of its steps.
+    recall: Option<R>,
+}
+
+impl<R> Running<R> {
+    fn called_with(given: Given) -> Self {
+        Self { given, recall: None }
+    }
 }
 
 /// What does not change in an episode, kept as long as its specification is in use.
@@ -74,7 +92,13 @@ impl<N: Network> LearnedPolicy<N> {
     /// A policy of the given name. The network is used without gradients.
     pub fn new(name: &str, network: N, decoder: Decoder) -> Self {
         let (demonstrations, stacks) = (HashMap::new(), HashMap::new());
-        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations, stacks }
+        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations, stacks, tasks: Vec::new() }
+    }
+
+    /// The same for a network that knows tasks by name, in the order of its rows.
+    #[must_use]
+    pub fn knowing(self, tasks: Vec<String>) -> Self {
+        Self { tasks, ..self }
     }
 
     /// Reads the demonstrations of new episodes, and forgets those of episodes that are over.
@@ -99,24 +123,36 @@ impl<N: Network> LearnedPolicy<N> {
         self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
     }
 
-    /// Takes what the running call remembers off its episode's stack. Calls above it have returned, and one that has
-    /// just begun remembers nothing.
-    fn recall(&mut self, query: &Query) -> Option<N::Recall> {
+    /// Takes the running call off its episode's stack. Calls above it have returned, and one that has just begun
+    /// remembers nothing.
+    fn running(&mut self, query: &Query) -> Running<N::Recall> {
         let stack = self.stacks.entry(query.episode).or_default();
-        stack.resize_with(usize::from(query.depth) + 1, || None);
-        stack.pop().flatten().filter(|_| query.step > 0)
+        stack.resize_with(usize::from(query.depth) + 1, || Running::called_with(Given::default()));
+        let mut running = stack.pop().unwrap_or_else(|| Running::called_with(Given::default()));
+        running.recall = running.recall.filter(|_| query.step > 0);
+        if query.depth == 0 {
+            running.given.task = self.tasks.iter().position(|task| *task == query.specification.task_id);
+        }
+        running
     }
 
-    fn decide_one(&self, query: &Query, recall: Option<N::Recall>) -> (Decision, Option<N::Recall>) {
+    /// The decision, the running call after it, and what its callee is called with.
+    fn decide_one(&self, query: &Query, running: Running<N::Recall>) -> (Decision, [Running<N::Recall>; 2]) {
+        let Running { given, recall } = running;
+        let callee = |arguments| Running::called_with(Given { task: None, arguments });
         let known = self.demonstrations.get(&key(&query.specification));
-        let Some(known) = known else { return (Decision::end(query), None) };
+        let Some(known) = known else {
+            return (Decision::end(query), [Running::called_with(given), callee(Default::default())]);
+        };
         let window = N::window(&known.demonstration, query.window);
-        let reading = self.network.read(&window, &query.observation.to_flat());
+        let reading = self.network.read(&window, &query.observation.to_flat(), &[given]);
         let (core, recall) = self.network.core(&reading, query.program, &[1], recall);
-        (self.decision(query, &reading, &core), Some(recall))
+        let (decision, arguments) = self.decision(query, &reading, &core);
+        (decision, [Running { given, recall: Some(recall) }, callee(arguments)])
     }
 
-    fn decision(&self, query: &Query, reading: &N::Reading, core: &CoreOutput) -> Decision {
+    /// The decision, and the slots that its callee is called with.
+    fn decision(&self, query: &Query, reading: &N::Reading, core: &CoreOutput) -> (Decision, Arguments) {
         let end_probability = logistic(values(core.end.clone()).first().copied().unwrap_or_default());
         let (program, program_probability) = likeliest_program(values(core.programs.clone()), N::DECISIONS);
         let labels = program.is_composite().then(|| self.network.scope(reading, query.program, core)).flatten();
@@ -125,16 +161,13 @@ impl<N: Network> LearnedPolicy<N> {
             .decoder
             .decode(&labels)
             .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
-        let argument = program.takes_argument().then(|| {
-            let slots = values(self.network.argument(reading, query.program, core));
-            SlotIndex(likeliest(&slots).0 as u16)
-        });
+        let arguments = self.arguments(reading, query, core, program);
         let probabilities =
             |label: ScopingLabel| labels.iter().map(|scores| scores[label as usize].exp()).collect::<Vec<f32>>();
-        Decision {
+        let decision = Decision {
             program,
             scope: scope.unwrap_or(query.window),
-            argument,
+            argument: arguments[0].filter(|_| program.takes_argument()),
             end_of_program: program == Program::None || end_probability >= END_THRESHOLD,
             prediction: Some(Prediction {
                 program_probability,
@@ -142,9 +175,25 @@ impl<N: Network> LearnedPolicy<N> {
                 start_probabilities: probabilities(ScopingLabel::Start),
                 stop_probabilities: probabilities(ScopingLabel::End),
             }),
+        };
+        (decision, arguments)
+    }
+
+    /// The slots that a program is called with.
+    fn arguments(&self, reading: &N::Reading, query: &Query, core: &CoreOutput, callee: Program) -> Arguments {
+        let mut arguments = Arguments::default();
+        let n_arguments = N::DECISIONS.n_arguments_of(callee);
+        if n_arguments > 0 {
+            let logits = values(self.network.argument(reading, query.program, core));
+            let rows = logits.chunks_exact(query.specification.n_slots.max(1)).take(n_arguments);
+            arguments.iter_mut().zip(rows).for_each(|(slot, row)| *slot = Some(SlotIndex(likeliest(row).0 as u16)));
         }
+        arguments
     }
 }
+
+/// The slots of a call.
+type Arguments = [Option<SlotIndex>; MAX_ARGUMENTS];
 
 impl<N: Network> Policy for LearnedPolicy<N> {
     fn name(&self) -> &str {
@@ -157,11 +206,11 @@ impl<N: Network> Policy for LearnedPolicy<N> {
 
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
         self.refresh(queries);
-        let recalled: Vec<_> = queries.iter().map(|query| self.recall(query)).collect();
+        let running: Vec<_> = queries.iter().map(|query| self.running(query)).collect();
         let decided: Vec<_> =
-            queries.par_iter().zip(recalled).map(|(query, recall)| self.decide_one(query, recall)).collect();
-        let remember = |(query, (decision, recall)): (&Query, (Decision, Option<N::Recall>))| {
-            self.stacks.entry(query.episode).or_default().push(recall);
+            queries.par_iter().zip(running).map(|(query, running)| self.decide_one(query, running)).collect();
+        let remember = |(query, (decision, running)): (&Query, (Decision, [Running<N::Recall>; 2]))| {
+            self.stacks.entry(query.episode).or_default().extend(running);
             decision
         };
         queries.iter().zip(decided).map(remember).collect()

@@ -10,6 +10,8 @@ use crate::trace::{Episode, Observation, Prediction, Span};
 /// A demonstration as a policy sees it: its boundary observations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Specification {
+    /// The name of the task, for a policy that knows tasks by name. It says nothing of what is to be done.
+    pub task_id: String,
     /// Slots of each observation.
     pub n_slots: usize,
     /// Boundary frames.
@@ -89,6 +91,7 @@ impl Specification {
         let observations: Vec<f32> =
             episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
         let n_slots = episode.scene.slots.len();
-        Self { n_slots, n_frames: observations.len() / Observation::width(n_slots), observations }
+        let task_id = episode.provenance.task_id.clone();
+        Self { task_id, n_slots, n_frames: observations.len() / Observation::width(n_slots), observations }
     }
 }

@@ -7,6 +7,7 @@
 use rand::Rng;
 use rand::seq::SliceRandom as _;
 
+use crate::model::Given;
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
 use crate::task::Family;
@@ -26,8 +27,10 @@ pub(super) struct Views {
     pub(super) window: Vec<f32>,
     /// The row that is seen now.
     pub(super) state: Vec<f32>,
-    /// The slot that is the argument.
-    pub(super) argument: Option<usize>,
+    /// The slots that are arguments.
+    pub(super) arguments: Vec<SlotIndex>,
+    /// What the running program was called with.
+    pub(super) given: Given,
 }
 
 impl Views {
@@ -46,7 +49,12 @@ impl Views {
         if relabelled < config.relabel_slots.unwrap_or_default() {
             self.window.chunks_exact_mut(Observation::width(self.n_slots)).for_each(|row| relabel(row, &order));
             relabel(&mut self.state, &order);
-            self.argument = self.argument.and_then(|slot| order.iter().position(|&shown| shown == slot));
+            let label = |slot: &mut SlotIndex| {
+                let found = order.iter().position(|&shown| shown == usize::from(slot.0));
+                *slot = found.map_or(*slot, |label| SlotIndex(label as u16));
+            };
+            self.arguments.iter_mut().for_each(label);
+            self.given.arguments.iter_mut().flatten().for_each(label);
         }
     }
 

@@ -7,8 +7,9 @@
 
 use rand::Rng;
 
-use crate::model::Windows;
+use crate::model::{Given, Windows};
 use crate::program::Program;
+use crate::scene::SlotIndex;
 use crate::seed::Seed;
 use crate::task::Family;
 use crate::trace::{Observation, ScopingLabel};
@@ -42,8 +43,10 @@ pub struct Part {
     pub weight: f32,
     /// `[B, T, 4]`; nothing without labels.
     pub scopes: Option<Vec<f32>>,
-    /// `[B, N]`; nothing without labels.
+    /// `[B * arguments, N]`, see [`crate::model::Decisions::n_arguments`]; nothing without labels.
     pub arguments: Option<Vec<f32>>,
+    /// What each running program was called with.
+    pub given: Vec<Given>,
 }
 
 /// One example with its own copies of what augmentations change.
@@ -51,7 +54,8 @@ struct Prepared {
     example: Example,
     window: Vec<f32>,
     state: Vec<f32>,
-    argument: Option<usize>,
+    arguments: Vec<SlotIndex>,
+    given: Given,
 }
 
 /// Decisions of one call that are learned together, all with the same window.
@@ -131,7 +135,7 @@ impl Counts {
         Self {
             examples: drawn.clone().count(),
             scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
-            arguments: drawn.filter(|prepared| prepared.argument.is_some()).count(),
+            arguments: drawn.map(|prepared| prepared.arguments.len()).sum(),
         }
     }
 }
@@ -169,7 +173,8 @@ fn prepare(
         n_slots: data.n_slots,
         window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
-        argument: example.argument.map(|slot| usize::from(slot.0)),
+        arguments: example.arguments.clone(),
+        given: example.given,
     };
     // One draw, whatever the settings: see `Views::augment`.
     let mut recovery = Seed(rng.random()).rng();
@@ -179,8 +184,8 @@ fn prepare(
         recovery::knock_over(&sub_tasks, &mut example, &mut views.state, &mut recovery);
     }
     views.augment(family, config, &example, rng);
-    let Views { n_slots: _, window, state, argument } = views;
-    Prepared { example, window, state, argument }
+    let Views { n_slots: _, window, state, arguments, given } = views;
+    Prepared { example, window, state, arguments, given }
 }
 
 fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
@@ -196,9 +201,13 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         .iter()
         .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
         .collect();
-    let arguments = part.iter().any(|prepared| prepared.argument.is_some()).then(|| {
+    let arguments = part.iter().any(|prepared| !prepared.arguments.is_empty()).then(|| {
         let value = 1.0 / counts.arguments as f32;
-        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.argument, value)).collect()
+        let slots = |prepared: &Prepared| {
+            let named = prepared.arguments.iter().map(|slot| Some(usize::from(slot.0)));
+            named.chain(std::iter::repeat(None)).take(examples.decisions().n_arguments()).collect::<Vec<_>>()
+        };
+        part.iter().flat_map(slots).flat_map(|slot| one_hot(n_slots, slot, value)).collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
@@ -213,6 +222,7 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         weight,
         scopes,
         arguments,
+        given: part.iter().map(|prepared| prepared.given).collect(),
     }
 }
 

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{EncoderKind, Variant};
+use crate::model::{Architecture, EncoderKind, Variant};
 use crate::training::TrainError;
 
 /// What is trained, and how.
@@ -22,11 +22,14 @@ impl Training {
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
-        let (learning_rate, relabel_slots, gripper_jitter, recovery_states) = match self.variant.encoder() {
-            EncoderKind::ObjectCentric => (0.003, 0.0, 0.2, 0.25),
-            EncoderKind::Flattened => (0.002, 1.0, 0.0, 0.0),
+        let (steps, learning_rate, relabel_slots, gripper_jitter, recovery_states) = match self.variant.encoder() {
+            EncoderKind::ObjectCentric => (1000, 0.003, 0.0, 0.2, 0.25),
+            EncoderKind::Flattened => (3000, 0.002, 1.0, 0.0, 0.0),
         };
+        // What a task does to which slot stands in the weights of a model without a specification.
+        let relabel_slots = if self.variant.architecture() == Architecture::Npi { 0.0 } else { relabel_slots };
         let config = TrainConfig {
+            steps: self.config.steps.or(Some(steps)),
             learning_rate: self.config.learning_rate.or(Some(learning_rate)),
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
             gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
@@ -41,8 +44,8 @@ impl Training {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
-    /// Steps of the optimizer.
-    pub steps: u32,
+    /// Steps of the optimizer; by default 1000 for object-centric and 3000 for flattened networks.
+    pub steps: Option<u32>,
     /// Decisions of the root program in a step; programs below it have half as many each.
     pub batch: u32,
     /// Highest learning rate; by default 0.003 for object-centric and 0.002 for flattened networks.
@@ -81,7 +84,7 @@ pub struct TrainConfig {
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
-            steps: 1000,
+            steps: None,
             batch: 32,
             learning_rate: None,
             warmup_steps: 100,
@@ -151,7 +154,7 @@ impl TrainConfig {
     pub fn check(&self) -> Result<(), TrainError> {
         let Self { pairing: _, curriculum: _, warmup_steps: _, loss, .. } = self;
         let at_least_one = [
-            ("steps", self.steps),
+            ("steps", self.steps.unwrap_or(1)),
             ("batch", self.batch),
             ("checkpoint_every", self.checkpoint_every),
             ("metrics_every", self.metrics_every),
@@ -186,13 +189,18 @@ impl TrainConfig {
         }
     }
 
+    /// Steps of the optimizer. Zero where none are set or filled in.
+    pub fn n_steps(&self) -> u32 {
+        self.steps.unwrap_or_default()
+    }
+
     /// The learning rate of a step: a straight rise, then a cosine. Zero where none is set or filled in.
     pub fn learning_rate_at(&self, step: u32) -> f64 {
         let highest = f64::from(self.learning_rate.unwrap_or_default());
         if step < self.warmup_steps {
             return highest * f64::from(step + 1) / f64::from(self.warmup_steps);
         }
-        let span = self.steps.saturating_sub(self.warmup_steps).max(1);
+        let span = self.n_steps().saturating_sub(self.warmup_steps).max(1);
         let done = f64::from(step - self.warmup_steps) / f64::from(span);
         let last = f64::from(self.final_learning_rate);
         highest * (last + (1.0 - last) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos()))

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use rand::Rng;
 
 use crate::dataset::{DatasetTrials, TrialData};
-use crate::model::Decisions;
+use crate::model::{Decisions, Given};
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::task::Split;
@@ -41,8 +41,10 @@ pub struct Example {
     pub end_of_program: bool,
     /// The callee's part, counted from the window's first frame; `None` for what is not learned (primitives, `none`).
     pub scope: Option<Span>,
-    /// The callee's argument.
-    pub argument: Option<SlotIndex>,
+    /// The slots that the callee was called with, as far as the model decides them.
+    pub arguments: Vec<SlotIndex>,
+    /// What the running program was called with, where there is no specification.
+    pub given: Given,
     /// What the next primitive is called with; `None` where it is not a `move_to`.
     pub next_move: Option<SlotIndex>,
     /// Arguments of every move below the running program.
@@ -69,6 +71,8 @@ pub struct Examples<'d> {
     trees: Vec<CallTree>,
     /// Positions of the training trials, by task.
     tasks: Vec<Vec<usize>>,
+    /// Which of `tasks` a trial is of.
+    task_of_trial: Vec<Option<usize>>,
     levels: Vec<Level>,
 }
 
@@ -119,6 +123,10 @@ impl<'d> Examples<'d> {
         if tasks.is_empty() {
             return Err(TrainError::NoTrials { total: data.trials.len() });
         }
+        let mut task_of_trial = vec![None; data.trials.len()];
+        let of_tasks =
+            tasks.iter().enumerate().flat_map(|(task, trials)| trials.iter().map(move |&trial| (task, trial)));
+        of_tasks.for_each(|(task, trial)| task_of_trial[trial] = Some(task));
         let mut levels: BTreeMap<Program, Level> = BTreeMap::new();
         for (task, trials) in tasks.iter().enumerate() {
             for &trial in trials {
@@ -132,7 +140,7 @@ impl<'d> Examples<'d> {
                 }
             }
         }
-        Ok(Self { data, decisions, grain, trees, tasks, levels: levels.into_values().collect() })
+        Ok(Self { data, decisions, grain, trees, tasks, task_of_trial, levels: levels.into_values().collect() })
     }
 
     /// The programs that decide, in the order of the program memory, and whether each is a root.
@@ -140,7 +148,12 @@ impl<'d> Examples<'d> {
         self.levels.iter().map(|level| (level.program, level.is_root))
     }
 
-    /// What each example decides.
+    /// Ids of the tasks that are learned from, in order.
+    pub fn task_ids(&self) -> Vec<String> {
+        self.tasks.iter().map(|trials| self.data.trials[trials[0]].task_id.clone()).collect()
+    }
+
+    /// What is learned.
     pub fn decisions(&self) -> Decisions {
         self.decisions
     }
@@ -179,12 +192,12 @@ impl<'d> Examples<'d> {
         let decided = calls.get(call)?;
         let own_caller = match self.decisions {
             Decisions::Primitives => 0,
-            Decisions::Scoped | Decisions::Unscoped => decided.caller?.0 as usize,
+            Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => decided.caller?.0 as usize,
         };
         let demonstrated = &self.data.trials[demonstration].calls;
         let window = match self.decisions {
             Decisions::Scoped => demonstrated[self.matching(trial, own_caller, demonstration)?].output?,
-            Decisions::Unscoped | Decisions::Primitives => demonstrated[0].output?,
+            Decisions::Unscoped | Decisions::Primitives | Decisions::Arguments => demonstrated[0].output?,
         };
         let scope = if self.decisions.has_scopes() && decided.program.is_composite() {
             let part = demonstrated[self.matching(trial, call, demonstration)?].output?;
@@ -201,10 +214,11 @@ impl<'d> Examples<'d> {
             callee: decided.program,
             end_of_program: match self.decisions {
                 Decisions::Primitives => decided.program == Program::None,
-                Decisions::Scoped | Decisions::Unscoped => decided.end_of_program,
+                Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => decided.end_of_program,
             },
             scope,
-            argument: decided.argument,
+            arguments: self.arguments(calls, call),
+            given: self.given(trial, own_caller),
             next_move: next.filter(|call| call.program == Program::MoveTo).and_then(|call| call.argument),
             involved: moves_below(calls, own_caller),
             last_decision: next.is_none(),
@@ -223,6 +237,22 @@ impl<'d> Examples<'d> {
             Some(SubTask { program: calls[call].program, source, target, part, offset_m })
         };
         self.trees[trial].signatures.iter().filter_map(sub_task).collect()
+    }
+
+    /// What a call names, as far as the model decides it.
+    fn arguments(&self, calls: &[ProgramCall], call: usize) -> Vec<SlotIndex> {
+        let own = calls[call].argument;
+        let slots = own.map_or_else(|| moves_below(calls, call), |slot| vec![slot]);
+        let n_arguments = self.decisions.n_arguments_of(calls[call].program);
+        slots.into_iter().take(n_arguments).collect()
+    }
+
+    /// What a running call was called with: the root with its task, any other with slots.
+    fn given(&self, trial: usize, call: usize) -> Given {
+        let mut given = Given { task: self.task_of_trial[trial].filter(|_| call == 0), ..Given::default() };
+        let slots = self.arguments(&self.data.trials[trial].calls, call);
+        given.arguments.iter_mut().zip(slots).for_each(|(argument, slot)| *argument = Some(slot));
+        given
     }
 
     /// The call of `other` that does what a call of `trial` does.
@@ -269,7 +299,7 @@ impl CallTree {
         let signatures = callees[0].iter().map(|&position| (position, moves_below(calls, position))).collect();
         let decisions = match decisions {
             Decisions::Primitives => BTreeMap::from([(calls[0].program, vec![without_hierarchy(calls)])]),
-            Decisions::Scoped | Decisions::Unscoped => by_program(calls, &callees),
+            Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => by_program(calls, &callees),
         };
         Ok(Self { callees, signatures, decisions })
     }

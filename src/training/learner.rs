@@ -137,7 +137,7 @@ pub fn losses<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Lo
     let device = network.device();
     let n_batch = part.ends.len();
     let demonstration = network.demonstration(&part.windows);
-    let reading = network.read(&demonstration, &part.states);
+    let reading = network.read(&demonstration, &part.states, &part.given);
     let (core, _) = network.core(&reading, part.program, &part.steps, None);
     let programs = TensorData::new(part.programs.clone(), [n_batch, Program::ALL.len()]);
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
@@ -151,7 +151,7 @@ pub fn losses<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Lo
         cross_entropy(labels, targets)
     });
     let argument = part.arguments.as_ref().map(|targets| {
-        let targets = TensorData::new(targets.clone(), [n_batch, part.windows.n_slots()]);
+        let targets = TensorData::new(targets.clone(), [n_batch * N::DECISIONS.n_arguments(), part.windows.n_slots()]);
         cross_entropy(network.argument(&reading, part.program, &core), Tensor::from_data(targets, &device))
     });
     let weighed = [(&scope, weights.scope), (&argument, weights.argument)];

@@ -158,7 +158,7 @@ impl Bench {
 
     /// Decisions learned from in training, batch building included.
     fn train_samples(&self, trials: &DatasetTrials) {
-        let config = TrainConfig { steps: 60, checkpoint_every: 1000, ..TrainConfig::default() };
+        let config = TrainConfig { steps: Some(60), checkpoint_every: 1000, ..TrainConfig::default() };
         let training = Training { variant: Variant::Ntp, seed: 0, config };
         let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
         let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join("model"), &mut hooks));

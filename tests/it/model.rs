@@ -3,12 +3,13 @@
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Gru, LabelScores, Lstm, ModelConfig,
+    CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Given, Gru, LabelScores, Lstm, ModelConfig,
     ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory, ScopeHead,
     Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
+use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::task::{Family, Split};
 use ntp::trace::{Observation, Span};
@@ -65,7 +66,7 @@ struct Said {
 
 fn say(network: &impl Network, n_slots: usize, windows: &[&[f32]], states: &[f32], program: Program) -> Said {
     let demonstration = network.demonstration(&Windows::new(n_slots, windows));
-    let reading = network.read(&demonstration, states);
+    let reading = network.read(&demonstration, states, &vec![Given::default(); windows.len()]);
     let (core, _) = network.core(&reading, program, &[windows.len()], None);
     Said {
         programs: values(core.programs.clone()),
@@ -110,6 +111,8 @@ fn parameter_counts_are_what_they_were() {
             ("flat_paper", 229_225),
             ("flat_gru", 26_474),
             ("flat_gru_paper", 285_097),
+            ("npi", 26_455),
+            ("npi_paper", 129_713),
         ]
     );
 }
@@ -161,7 +164,7 @@ impl NetworkUse for Padding {
         assert_near(&together.programs[..Program::ALL.len()], &alone.programs);
         assert_near(&together.ends[..1], &alone.ends);
         assert_near(&together.scopes[..alone.scopes.len()], &alone.scopes);
-        assert_near(&together.arguments[..8], &alone.arguments);
+        assert_near(&together.arguments[..alone.arguments.len()], &alone.arguments);
     }
 }
 
@@ -180,14 +183,14 @@ impl NetworkUse for Packing {
         let (window, states) = (rows(5, 8, 1), rows(4, 8, 3));
         // Rows 0, 2 and 3 are the first call's, row 1 the second's.
         let demonstration = network.demonstration(&Windows::new(8, &[window.as_slice(); 4]));
-        let reading = network.read(&demonstration, &states);
+        let reading = network.read(&demonstration, &states, &[Given::default(); 4]);
         let (packed, _) = network.core(&reading, Program::Pick, &[2, 1, 1], None);
         let packed = values(packed.programs);
         let mut recall = None;
         let mut alone = Vec::new();
         for step in [0, 2, 3] {
             let demonstration = network.demonstration(&Windows::new(8, &[&window]));
-            let reading = network.read(&demonstration, &states[step * 26..(step + 1) * 26]);
+            let reading = network.read(&demonstration, &states[step * 26..(step + 1) * 26], &[Given::default()]);
             let (core, remembered) = network.core(&reading, Program::Pick, &[1], recall.take());
             recall = Some(remembered);
             let programs = values(core.programs);
@@ -195,7 +198,11 @@ impl NetworkUse for Packing {
             alone.push(programs);
         }
         let (afresh, _) = network.core(
-            &network.read(&network.demonstration(&Windows::new(8, &[&window])), &states[2 * 26..3 * 26]),
+            &network.read(
+                &network.demonstration(&Windows::new(8, &[&window])),
+                &states[2 * 26..3 * 26],
+                &[Given::default()],
+            ),
             Program::Pick,
             &[1],
             None,
@@ -209,6 +216,41 @@ fn packed_steps_are_the_same_as_steps_one_by_one_and_only_recurrent_networks_rem
     for (variant, remembers) in with_every(|_| Packing) {
         let is_recurrent = variant.name().contains("gru") || variant.name().contains("npi");
         assert_eq!(remembers, is_recurrent, "{variant}");
+    }
+}
+
+/// What a network that knows two tasks says to a root, told by its task, and to another program, told by a slot.
+struct Told(Vec<Given>);
+
+impl NetworkUse for Told {
+    type Output = Vec<Vec<f32>>;
+
+    fn run<N: Network>(self, network: N) -> Self::Output {
+        let state = rows(1, 8, 3);
+        let demonstration = network.demonstration(&Windows::new(8, &[&state]));
+        let say = |given: &Given| {
+            let reading = network.read(&demonstration, &state, std::slice::from_ref(given));
+            let (core, _) = network.core(&reading, Program::Pick, &[1], None);
+            let arguments = values(network.argument(&reading, Program::Pick, &core));
+            assert_eq!(arguments.len(), 8 * N::DECISIONS.n_arguments());
+            values(core.programs)
+        };
+        self.0.iter().map(say).collect()
+    }
+}
+
+#[test]
+fn npi_is_told_by_arguments_and_by_the_names_of_tasks_that_it_knows() {
+    let task = |task| Given { task, ..Given::default() };
+    let slot = |slot| Given { arguments: [Some(SlotIndex(slot)), None], ..Given::default() };
+    let given = [task(None), task(Some(0)), task(Some(1)), task(Some(9)), slot(0), slot(5)];
+    for variant in [Variant::Npi, Variant::NpiPaper] {
+        let knowing = ModelConfig { tasks: vec!["a".to_owned(), "b".to_owned()], ..config(variant) };
+        let said = with_network(&knowing, Seed(1), &device(), Told(given.to_vec()));
+        assert_eq!(said[0], said[3], "a task without a row is no task");
+        for (idx, other) in [(1, 0), (2, 0), (2, 1), (4, 0), (5, 0), (5, 4)] {
+            assert_ne!(said[idx], said[other], "{variant}: {idx} and {other}");
+        }
     }
 }
 
@@ -252,7 +294,7 @@ fn a_cut_demonstration_reads_as_its_part_alone() {
     let state = rows(1, 8, 5);
     let demonstration = network.demonstration(&Windows::new(8, &[&all]));
     let window = Ntp::<ObjectCentric>::window(&demonstration, Span { begin: 2, end: 6 });
-    let reading = network.read(&window, &state);
+    let reading = network.read(&window, &state, &[Given::default()]);
     let (core, _) = network.core(&reading, Program::PickAndPlace, &[1], None);
     let cut = values(network.scope(&reading, Program::PickAndPlace, &core).unwrap());
     let alone = say(&network, 8, &[&all[2 * 26..6 * 26]], &state, Program::PickAndPlace);

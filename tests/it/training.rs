@@ -81,8 +81,11 @@ fn labels_of_stacking_are_the_demonstrations_spans() {
     assert_eq!((second[0].window, second[0].scope, second[0].end_of_program), (span(4, 9), Some(span(0, 3)), false));
     assert_eq!((second[1].callee, second[1].scope, second[1].end_of_program), (Program::Place, Some(span(2, 5)), true));
     let picks = labels(Program::Pick);
-    assert_eq!((picks[0].argument, picks[0].window, picks[0].scope), (Some(SlotIndex(1)), span(0, 3), None));
-    assert_eq!((picks[1].callee, picks[1].argument, picks[1].next_move), (Program::Grip, None, None));
+    assert_eq!(
+        (picks[0].arguments.as_slice(), picks[0].window, picks[0].scope),
+        ([SlotIndex(1)].as_slice(), span(0, 3), None)
+    );
+    assert_eq!((picks[1].callee, picks[1].arguments.len(), picks[1].next_move), (Program::Grip, 0, None));
     assert_eq!(picks[2].next_move, Some(SlotIndex(2)));
 }
 
@@ -96,7 +99,10 @@ fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
     while data.trials[run[0].trial].task_id != "b" {
         run = examples.draw(0, Pairing::Cross, &mut rng);
     }
-    let seen: Vec<_> = run.iter().map(|step| (step.callee, step.argument, step.frame, step.end_of_program)).collect();
+    let seen: Vec<_> = run
+        .iter()
+        .map(|step| (step.callee, step.arguments.first().copied(), step.frame, step.end_of_program))
+        .collect();
     let slot = |slot| Some(SlotIndex(slot));
     assert_eq!(
         seen,
@@ -123,6 +129,27 @@ fn without_scopes_every_program_learns_from_the_whole_demonstration() {
             assert_eq!((example.window, example.scope), (span(0, n_frames), None));
         }
     }
+}
+
+#[test]
+fn npi_learns_what_programs_are_called_with() {
+    let data = towers();
+    let examples = Examples::of(&data, Decisions::Arguments, Grain::Call).unwrap();
+    assert_eq!(examples.task_ids(), ["a", "b"]);
+    let of = |program: Program| -> Example {
+        let trial = data.trials.iter().position(|trial| trial.task_id == "b").unwrap();
+        examples.example(trial, decisions(&data, trial, program)[0], trial).unwrap()
+    };
+    let slots = |slots: [u16; 2]| slots.map(SlotIndex);
+    let root = of(Program::BlockStacking);
+    assert_eq!((root.given.task, root.given.arguments), (Some(1), [None, None]));
+    assert_eq!(root.arguments, slots([3, 5]));
+    let below = of(Program::PickAndPlace);
+    assert_eq!((below.given.task, below.given.arguments), (None, slots([3, 5]).map(Some)));
+    assert_eq!((below.callee, below.arguments.as_slice()), (Program::Pick, &slots([3, 5])[..1]));
+    let lowest = of(Program::Place);
+    assert_eq!(lowest.given.arguments, [Some(SlotIndex(5)), None]);
+    assert_eq!((lowest.callee, lowest.arguments.as_slice()), (Program::MoveTo, &slots([5, 3])[..1]));
 }
 
 #[test]
@@ -160,7 +187,7 @@ fn sub_tasks_are_matched_by_what_they_do_when_counts_differ() {
     assert_eq!([scope(2, 1), scope(3, 1)], [Some(span(8, 13)); 2], "of several alike the first is meant");
     let call = decisions(&data, 1, Program::Drop)[2 * 3];
     let drop = examples.example(1, call, 0).unwrap();
-    assert_eq!((drop.window, drop.argument), (span(6, 9), Some(SlotIndex(6))));
+    assert_eq!((drop.window, drop.arguments), (span(6, 9), vec![SlotIndex(6)]));
 }
 
 #[test]
@@ -242,7 +269,7 @@ fn weights(training: &Training, data: &DatasetTrials) -> Vec<u8> {
 }
 
 fn short() -> TrainConfig {
-    TrainConfig { steps: 6, batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
+    TrainConfig { steps: Some(6), batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
 }
 
 #[test]
@@ -263,7 +290,7 @@ fn forty_steps_are_twenty_and_twenty_more() {
     let data = towers();
     for curriculum in [Curriculum::Equal, Curriculum::Adaptive] {
         let config =
-            ntp(TrainConfig { steps: 40, batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() });
+            ntp(TrainConfig { steps: Some(40), batch: 8, checkpoint_every: 7, curriculum, ..TrainConfig::default() });
         let (straight, resumed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let whole = train_until(&config, &data, straight.path(), None).unwrap();
         let stopped = train_until(&config, &data, resumed.path(), Some(20)).unwrap_err();
@@ -329,7 +356,7 @@ fn data_and_settings_that_make_no_sense_are_refused() {
     let mut mixed = towers();
     mixed.trials.extend(demonstrations(&[sorting("m", [0, 1, 2, 3], Split::Seen)], 1).trials);
     assert!(matches!(refused(&config, &mixed), TrainError::MixedFamilies { .. }));
-    let none = TrainConfig { steps: 0, ..config.clone() };
+    let none = TrainConfig { steps: Some(0), ..config.clone() };
     assert!(matches!(refused(&none, &towers()), TrainError::Config { key: "steps", .. }));
     let much = TrainConfig { gripper_jitter: Some(1.5), ..config };
     let error = refused(&much, &towers()).to_string();
@@ -362,7 +389,7 @@ fn a_short_training_stacks_unseen_towers() {
     let set = sample(Family::BlockStacking, 20, 20, Seed(3)).unwrap();
     let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
     let folder = tempfile::tempdir().unwrap();
-    let config = TrainConfig { steps: 300, gripper_jitter: Some(0.0), ..TrainConfig::default() };
+    let config = TrainConfig { steps: Some(300), gripper_jitter: Some(0.0), ..TrainConfig::default() };
     let summary = train_until(&ntp(config), &demonstrations(&seen, 10), folder.path(), None).unwrap();
     let (first, root) = (&summary.metrics[0], last(&summary.metrics, Program::BlockStacking));
     assert!(root.loss_total < 0.1 * first.loss_total, "{} of {}", root.loss_total, first.loss_total);

@@ -1,0 +1,67 @@
+//! State and arguments as one vector.
+
+use burn::module::Module;
+use burn::nn::Linear;
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::model::decisions::MAX_ARGUMENTS;
+use crate::model::features::{Rows, flat_width};
+use crate::model::flattened::FlattenedConfig;
+use crate::model::layers::{Init, Mlp};
+use crate::model::network::Given;
+use crate::model::npi::{CallEncoder, flags};
+
+/// All slots side by side, and for each whether it is an argument.
+#[derive(Module, Debug)]
+pub struct ByVector {
+    state: Mlp,
+    hidden: Mlp,
+    slots: Linear,
+}
+
+impl CallEncoder for ByVector {
+    type Config = FlattenedConfig;
+    /// `[B, H]`
+    type Reading = Tensor<2>;
+
+    fn new(config: &FlattenedConfig, n_slots: usize, init: &mut Init) -> Self {
+        let &FlattenedConfig { width, program_width, .. } = config;
+        Self {
+            state: init.mlp(&[flat_width(n_slots) + MAX_ARGUMENTS * n_slots, width, width]),
+            hidden: init.mlp(&[2 * width + program_width, width]),
+            slots: init.linear(width, MAX_ARGUMENTS * n_slots),
+        }
+    }
+
+    fn widths(config: &FlattenedConfig) -> (usize, usize) {
+        (config.width, config.program_width)
+    }
+
+    fn read(&self, states: &[f32], given: &[Given]) -> Tensor<2> {
+        let device = self.device();
+        let (n_batch, n_slots) = (given.len(), self.n_slots());
+        let states = TensorData::new(Rows { n_slots, values: states }.flat(), [n_batch, flat_width(n_slots)]);
+        let flags = TensorData::new(flags(given, n_slots), [n_batch, MAX_ARGUMENTS * n_slots]);
+        self.state.forward(Tensor::cat(vec![Tensor::from_data(states, &device), Tensor::from_data(flags, &device)], 1))
+    }
+
+    fn state(reading: &Tensor<2>) -> Tensor<2> {
+        reading.clone()
+    }
+
+    fn arguments(&self, reading: &Tensor<2>, program: Tensor<2>, hidden: Tensor<2>) -> Tensor<2> {
+        let n_batch = hidden.dims()[0];
+        let hidden = self.hidden.forward(Tensor::cat(vec![reading.clone(), program, hidden], 1));
+        self.slots.forward(hidden).reshape([n_batch * MAX_ARGUMENTS, self.n_slots()])
+    }
+
+    fn device(&self) -> Device {
+        self.slots.weight.device()
+    }
+}
+
+impl ByVector {
+    fn n_slots(&self) -> usize {
+        self.slots.weight.dims()[1] / MAX_ARGUMENTS
+    }
+}
