@@ -134,7 +134,7 @@ pub(super) fn program_to_proto(program: Program) -> proto::Program {
 pub(super) fn program_from_proto(number: i32) -> Result<Program, MessageProblem> {
     let unknown = || MessageProblem::UnknownProgram { number };
     match proto::Program::try_from(number).map_err(|_error| unknown())? {
-        proto::Program::Idle => Err(unknown()),
+        proto::Program::Idle | proto::Program::TableCleanup => Err(unknown()),
         proto::Program::None => Ok(Program::None),
         proto::Program::BlockStacking => Ok(Program::BlockStacking),
         proto::Program::ObjectSorting => Ok(Program::ObjectSorting),
