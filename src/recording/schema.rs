@@ -127,6 +127,7 @@ pub(super) fn program_to_proto(program: Program) -> proto::Program {
         Program::MoveTo => proto::Program::MoveTo,
         Program::Grip => proto::Program::Grip,
         Program::Release => proto::Program::Release,
+        Program::TableCleanup => proto::Program::TableCleanup,
     }
 }
 
@@ -134,7 +135,7 @@ pub(super) fn program_to_proto(program: Program) -> proto::Program {
 pub(super) fn program_from_proto(number: i32) -> Result<Program, MessageProblem> {
     let unknown = || MessageProblem::UnknownProgram { number };
     match proto::Program::try_from(number).map_err(|_error| unknown())? {
-        proto::Program::Idle | proto::Program::TableCleanup => Err(unknown()),
+        proto::Program::Idle => Err(unknown()),
         proto::Program::None => Ok(Program::None),
         proto::Program::BlockStacking => Ok(Program::BlockStacking),
         proto::Program::ObjectSorting => Ok(Program::ObjectSorting),
@@ -146,5 +147,6 @@ pub(super) fn program_from_proto(number: i32) -> Result<Program, MessageProblem>
         proto::Program::MoveTo => Ok(Program::MoveTo),
         proto::Program::Grip => Ok(Program::Grip),
         proto::Program::Release => Ok(Program::Release),
+        proto::Program::TableCleanup => Ok(Program::TableCleanup),
     }
 }
