@@ -2,7 +2,7 @@
 
 use super::error::MessageProblem;
 use super::schema::proto::{self, body};
-use crate::scene::{Body, BodyIndex, Mobility, Scene, Shape, Slot};
+use crate::scene::{Body, BodyIndex, Bowl, Mobility, Scene, Shape, Slot};
 use crate::trace::{Actor, EpisodeParts, Provenance};
 
 /// What an `EpisodeStart` holds.
@@ -71,6 +71,16 @@ fn encode_shape(shape: &Shape) -> body::Shape {
         Shape::OpenBox { inner_m: [inner_half_x_m, inner_half_y_m, inner_height_m], wall_m } => {
             body::Shape::OpenBox(proto::OpenBox { inner_half_x_m, inner_half_y_m, inner_height_m, wall_m })
         }
+        Shape::Bowl(Bowl { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m }) => {
+            body::Shape::Bowl(proto::Bowl {
+                floor_radius_m,
+                rim_radius_m,
+                height_m,
+                wall_m,
+                foot_radius_m,
+                foot_height_m,
+            })
+        }
     }
 }
 
@@ -131,11 +141,11 @@ fn decode_body(body: proto::Body) -> Result<Body, MessageProblem> {
     if above != 0 {
         return Err(MessageProblem::OutOfRange { field: "color_rgb", found: u64::from(color_rgb) });
     }
-    Ok(Body { name, shape: decode_shape(&shape)?, mobility, color: [red, green, blue] })
+    Ok(Body { name, shape: decode_shape(&shape), mobility, color: [red, green, blue] })
 }
 
-fn decode_shape(shape: &body::Shape) -> Result<Shape, MessageProblem> {
-    let decoded = match *shape {
+fn decode_shape(shape: &body::Shape) -> Shape {
+    match *shape {
         body::Shape::Cuboid(proto::Cuboid { half_x_m, half_y_m, half_z_m }) => {
             Shape::Cuboid { half_extents_m: [half_x_m, half_y_m, half_z_m] }
         }
@@ -146,11 +156,15 @@ fn decode_shape(shape: &body::Shape) -> Result<Shape, MessageProblem> {
         body::Shape::OpenBox(proto::OpenBox { inner_half_x_m, inner_half_y_m, inner_height_m, wall_m }) => {
             Shape::OpenBox { inner_m: [inner_half_x_m, inner_half_y_m, inner_height_m], wall_m }
         }
-        body::Shape::Bowl(_) => {
-            return Err(MessageProblem::UnknownWord { field: "shape of a body", word: "bowl".to_owned() });
-        }
-    };
-    Ok(decoded)
+        body::Shape::Bowl(proto::Bowl {
+            floor_radius_m,
+            rim_radius_m,
+            height_m,
+            wall_m,
+            foot_radius_m,
+            foot_height_m,
+        }) => Shape::Bowl(Bowl { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m }),
+    }
 }
 
 /// A number of the schema in a smaller type.

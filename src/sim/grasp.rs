@@ -54,7 +54,7 @@ fn sides(shape: &Shape, in_world: &EnginePose) -> Vec<Side> {
             let lies = along.z.abs() < 0.5;
             lies.then(|| Side { across: Vector::new(-along.y, along.x, 0.0), half_m: radius_m }).into_iter().collect()
         }
-        Shape::Ball { .. } | Shape::OpenBox { .. } => Vec::new(),
+        Shape::Ball { .. } | Shape::OpenBox { .. } | Shape::Bowl(_) => Vec::new(),
     }
 }
 
