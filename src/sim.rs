@@ -16,6 +16,7 @@
 //! is no randomness here and no clock but counted steps. Each action ends with exactly one boundary frame.
 
 mod act;
+mod carry;
 mod check;
 mod clock;
 mod config;
@@ -216,6 +217,11 @@ impl RobotApi for Simulation {
 
     fn settle(&mut self) -> SceneState {
         self.come_to_rest();
+        self.state()
+    }
+
+    fn carry(&mut self, tray: BodyIndex) -> SceneState {
+        self.carry_away(tray);
         self.state()
     }
 }

@@ -157,12 +157,17 @@ fn suite_tasks<'t>(
     task_set: &'t TaskSet,
     spec: &SuiteSpec,
 ) -> Result<Vec<&'t Task>, PipelineError> {
-    let tasks: Vec<&Task> = task_set.of_split(spec.split).collect();
+    let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
+    let tasks: Vec<&Task> = task_set.of_split(spec.split).filter(is_asked_for).collect();
     if tasks.is_empty() {
+        let (key, problem) = match spec.bowls {
+            Some(bowls) => ("bowls", format!("is {bowls}, but no {} task has as many", spec.split)),
+            None => ("split", format!("is {}, but there is no such task", spec.split)),
+        };
         return Err(PipelineError::Value {
             path: context.pipeline.path.clone(),
-            key: format!("rollout.suites.{}.split", spec.name),
-            problem: format!("is {}, but there is no such task", spec.split),
+            key: format!("rollout.suites.{}.{key}", spec.name),
+            problem,
         });
     }
     Ok(tasks)

@@ -69,10 +69,8 @@ impl Bowl {
     pub fn prisms(&self) -> Vec<Prism> {
         let Self { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m } = *self;
         let floor_outer_m = floor_radius_m + wall_m;
-        let foot = Prism {
-            lower: octagon(foot_radius_m, -wall_m - foot_height_m),
-            upper: octagon(foot_radius_m, -wall_m),
-        };
+        let foot =
+            Prism { lower: octagon(foot_radius_m, -wall_m - foot_height_m), upper: octagon(foot_radius_m, -wall_m) };
         let floor = Prism { lower: octagon(floor_outer_m, -wall_m), upper: octagon(floor_outer_m, 0.0) };
         let wall = |side: usize| {
             let trapezoid = |inner_m: f32, z: f32| {

@@ -76,7 +76,7 @@ pub(super) fn gravest(first: Option<Cause>, second: Option<Cause>) -> Option<Cau
         Cause::KnockedTower => 1,
         Cause::DroppedObject => 2,
         Cause::MissedGrasp => 3,
-        Cause::TimeLimit | Cause::EndedEarly | Cause::NeverEnded => 4,
+        Cause::TimeLimit | Cause::EndedEarly | Cause::NeverEnded | Cause::FellWhenCarried => 4,
     };
     first.into_iter().chain(second).min_by_key(gravity)
 }

@@ -76,8 +76,8 @@ fn assert_near(found: &[f32], expected: &[f32]) {
 
 #[test]
 fn parameter_counts_are_what_they_were() {
-    assert_eq!(object_centric(0).num_params(), 23_950);
-    assert_eq!(flattened(0).num_params(), 251_213);
+    assert_eq!(object_centric(0).num_params(), 23_982);
+    assert_eq!(flattened(0).num_params(), 251_277);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The world in physics: motions, grasps, falls, piles, and that all of it repeats to the bit.
 
+mod cleanup;
 mod contract;
 mod rates;
 mod table;
