@@ -1,5 +1,6 @@
 //! What the expert would decide in an episode, and where a policy first differs.
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
 use crate::trace::{CallId, Episode, ProgramCall};
@@ -65,6 +66,22 @@ pub fn expected_calls<'d>(demonstration: &'d Episode, scene: &Scene) -> Vec<&'d 
         }
     }
     expected
+}
+
+/// What of the expert's calls a policy is expected to decide.
+pub(super) fn expected_of(decisions: Decisions, demonstration: &Episode, scene: &Scene) -> Vec<ProgramCall> {
+    let calls = expected_calls(demonstration, scene).into_iter();
+    let whole = demonstration.calls.first().and_then(|root| root.output);
+    let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
+    match decisions {
+        Decisions::Scoped => calls.cloned().collect(),
+        Decisions::Unscoped => calls.cloned().map(unscoped).collect(),
+        Decisions::Primitives => {
+            let end_of_program = |call: &ProgramCall| call.program == Program::None;
+            let decided = calls.filter(|call| !call.program.is_composite());
+            decided.map(|call| ProgramCall { end_of_program: end_of_program(call), ..call.clone() }).collect()
+        }
+    }
 }
 
 /// A call and all below it, which follow it in the order of calling.

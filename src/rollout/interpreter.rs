@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::robot::{Action, RobotApi, judge};
-use crate::rollout::divergence::first_divergence;
-use crate::rollout::{Decision, Divergence, Policy, Query, Specification, expected_calls};
+use crate::rollout::divergence::{expected_of, first_divergence};
+use crate::rollout::{Decision, Divergence, Policy, Query, Specification};
 use crate::task::Task;
 use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, ProgramCall, Provenance, TraceError};
 
@@ -61,7 +62,8 @@ pub struct RolloutEpisode {
 ///
 /// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
 pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
-    let mut running: Vec<Running<'_>> = starts.into_iter().map(|start| Running::new(start, limits)).collect();
+    let mut running: Vec<Running<'_>> =
+        starts.into_iter().map(|start| Running::new(start, policy.decides(), limits)).collect();
     loop {
         let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
         if queries.is_empty() {
@@ -95,10 +97,10 @@ struct Running<'t> {
 }
 
 impl<'t> Running<'t> {
-    fn new(start: Start<'t>, limits: Limits) -> Self {
+    fn new(start: Start<'t>, decisions: Decisions, limits: Limits) -> Self {
         let Start { task, demonstration, world, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expected: Vec<ProgramCall> = expected_calls(&demonstration, world.scene()).into_iter().cloned().collect();
+        let expected = expected_of(decisions, &demonstration, world.scene());
         let specification = Arc::new(Specification::of(&demonstration));
         Self {
             task,
