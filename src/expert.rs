@@ -5,6 +5,7 @@
 //!                                  └► place ─► move_to, release
 //! object_sorting ─► pick_and_drop  ─► pick  ─► move_to, grip
 //!                                  └► drop  ─► move_to, release
+//! table_cleanup  ─► pick_and_place (bowls), pick_and_drop (forks)
 //! ```
 //!
 //! # Invariants
@@ -17,9 +18,9 @@
 //! call of a program is a tail call (its step ends the program); a root ends with a step of its own that calls nothing.
 
 use crate::program::Program;
-use crate::robot::{Action, RobotApi};
+use crate::robot::{Action, RobotApi, judge};
 use crate::scene::{SceneState, SlotIndex, lies_in_any_container};
-use crate::task::{Family, Goal, Task, goal_holds};
+use crate::task::{Condition, Goal, Task};
 use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Span, TraceError};
 
 /// Acts out a task once. What goes wrong in physics is the episode's outcome, not an error.
@@ -32,11 +33,9 @@ pub fn demonstrate(task: &Task, world: &mut dyn RobotApi, provenance: Provenance
     let mut run = Run { world, calls: CallRecorder::new(task.family.root_program(), whole) };
     let acted = run.root(task);
     let Run { world, calls } = run;
-    let at_rest = world.settle();
-    let outcome = match acted {
+    let outcome = match acted.and_then(|()| judge(task, world)) {
+        Ok(()) => Outcome::Success,
         Err(cause) => Outcome::Failure(cause),
-        Ok(()) if goal_holds(world.scene(), &at_rest, &task.conditions) => Outcome::Success,
-        Ok(()) => Outcome::Failure(Cause::EndedEarly),
     };
     let frames = world.frames().to_vec();
     let n_frames = frames.len() as u32;
@@ -66,9 +65,9 @@ enum Then {
 impl Run<'_> {
     fn root(&mut self, task: &Task) -> Result<(), Cause> {
         for goal in &task.goals {
-            match task.family {
-                Family::BlockStacking => self.bring(*goal, Program::PickAndPlace, Program::Place)?,
-                Family::ObjectSorting => self.sort_category(*goal)?,
+            match goal.brings_about(task.family) {
+                Condition::OnTop { .. } => self.bring(*goal, Program::PickAndPlace, Program::Place)?,
+                Condition::Inside { .. } => self.sort_category(*goal)?,
             }
         }
         self.call(Program::None, None, Then::End);

@@ -21,7 +21,7 @@ pub enum Program {
     BlockStacking,
     /// Root of Object Sorting.
     ObjectSorting,
-    /// Puts one block on another.
+    /// Puts one thing on another.
     PickAndPlace,
     /// Puts one object into a container.
     PickAndDrop,
@@ -37,11 +37,13 @@ pub enum Program {
     Grip,
     /// Primitive: sets down or drops what is held and opens the fingers.
     Release,
+    /// Root of Table Clean-up.
+    TableCleanup,
 }
 
 impl Program {
     /// Every program, in the order of the program memory.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::None,
         Self::BlockStacking,
         Self::ObjectSorting,
@@ -53,6 +55,7 @@ impl Program {
         Self::MoveTo,
         Self::Grip,
         Self::Release,
+        Self::TableCleanup,
     ];
 
     /// The name in files and messages.
@@ -69,6 +72,7 @@ impl Program {
             Self::MoveTo => "move_to",
             Self::Grip => "grip",
             Self::Release => "release",
+            Self::TableCleanup => "table_cleanup",
         }
     }
 
@@ -95,7 +99,12 @@ impl Program {
     /// How many slots it is about: what is moved and where to, where a call has to name them both.
     pub fn n_slots(self) -> usize {
         match self {
-            Self::None | Self::BlockStacking | Self::ObjectSorting | Self::Grip | Self::Release => 0,
+            Self::None
+            | Self::BlockStacking
+            | Self::ObjectSorting
+            | Self::TableCleanup
+            | Self::Grip
+            | Self::Release => 0,
             Self::Pick | Self::Place | Self::Drop | Self::MoveTo => 1,
             Self::PickAndPlace | Self::PickAndDrop => 2,
         }

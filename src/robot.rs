@@ -5,28 +5,34 @@
 //! Paper, section III: `move_to` takes an object index and moves the gripper to above that object; `grip` closes the
 //! gripper, `release` opens it.
 
+mod judge;
+
+pub use judge::judge;
+
 use crate::program::Program;
-use crate::scene::{Scene, SceneState, SlotIndex};
+use crate::scene::{BodyIndex, Scene, SceneState, SlotIndex};
 use crate::trace::{Cause, Frame, Push};
 
 /// A call of the robot API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
     /// Up, across above everything that stands, and down to hover [`HOVER_M`] above the centre of what the slot shows,
-    /// of an open box above the middle of its rim. Higher, if something stands in between.
+    /// of an open box or bowl above the middle of its rim. Higher, if something stands in between. A bowl in the
+    /// gripper, which is held at its rim, comes to hang above that middle itself.
     MoveTo(SlotIndex),
-    /// Down onto what lies below, close the fingers, hold it if it is between them.
+    /// Down onto what lies below, close the fingers, hold it if it is between them. A bowl is gripped at its rim, at
+    /// the side that is nearest to the gripper's y.
     Grip,
     /// Down until what is held rests on (or hangs just above) what lies below, and open the fingers. Over an open box
-    /// what is held goes first to where it will lie lowest.
+    /// or bowl what is held goes first to where it will lie lowest.
     Release,
 }
 
-/// Height of the gripper above the centre (of an open box: the rim) of the object that `move_to` names, in metres.
+/// Height of the gripper above the centre (of an open box or bowl: the rim) of the object that `move_to` names, in metres.
 /// Half-way between levels of a tower: with 2 cm + a multiple of 5 cm a gripper that has just released on a tower would
 /// seem to hover above one of its lower blocks.
 pub const HOVER_M: f32 = 0.145;
-/// Height of the gripper above the centre of what it holds, in metres.
+/// Height of the gripper above the centre of what it holds, in metres. Bowls are held at the rim.
 pub const GRASP_M: f32 = 0.02;
 
 impl Action {
@@ -67,6 +73,10 @@ pub trait RobotApi {
 
     /// Lets the world come to rest without recording, to judge the outcome: the state at rest.
     fn settle(&mut self) -> SceneState;
+
+    /// Lifts a tray with all that is on it and carries it without recording, to judge the outcome: the state at rest
+    /// where it was carried to.
+    fn carry(&mut self, tray: BodyIndex) -> SceneState;
 
     /// The last boundary frame: what a program sees.
     fn now(&self) -> &Frame {

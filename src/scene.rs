@@ -5,10 +5,14 @@
 //!
 //! # Slots
 //!
-//! A program's argument and an observation speak of *slots*, not of bodies. A slot of a block or container shows that
-//! one body. A slot of a category shows one of its instances: the one locked now, see [`Slot::bodies`].
+//! A program's argument and an observation speak of *slots*, not of bodies. A slot of a block, bowl or container
+//! shows that one body. A slot of a category shows one of its instances: the one locked now, see [`Slot::bodies`].
 
-use crate::geometry::{Pose, Vec3};
+mod bowl;
+
+pub use bowl::{Bowl, Prism};
+
+use crate::geometry::{Pose, Vec3, horizontal_distance};
 
 /// Index of a body in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,17 +49,52 @@ pub enum Shape {
         /// Thickness of walls and floor, in metres.
         wall_m: f32,
     },
+    /// A bowl on a foot. The body's centre is the middle of the *floor's upper side*.
+    Bowl(Bowl),
 }
 
 impl Shape {
-    /// Half of the axis-aligned box around the body when upright; for an open box of its inner space.
+    /// Half of the axis-aligned box around the body when upright; for open boxes and bowls of their inner space.
     pub fn half_extents_m(&self) -> Vec3 {
         match *self {
             Self::Cuboid { half_extents_m: [x, y, z] } => Vec3::new(x, y, z),
             Self::Cylinder { radius_m, half_height_m } => Vec3::new(radius_m, radius_m, half_height_m),
             Self::Ball { radius_m } => Vec3::repeat(radius_m),
             Self::OpenBox { inner_m: [x, y, height], .. } => Vec3::new(x, y, height / 2.0),
+            Self::Bowl(Bowl { rim_radius_m, height_m, .. }) => Vec3::new(rim_radius_m, rim_radius_m, height_m / 2.0),
         }
+    }
+
+    /// Height of the rim above the floor of what other bodies are put into; nothing for other shapes.
+    pub fn rim_m(&self) -> Option<f32> {
+        match *self {
+            Self::OpenBox { inner_m: [_, _, height_m], .. } | Self::Bowl(Bowl { height_m, .. }) => Some(height_m),
+            Self::Cuboid { .. } | Self::Cylinder { .. } | Self::Ball { .. } => None,
+        }
+    }
+
+    /// From the body's centre down to where it stands, when upright, in metres.
+    pub fn foot_m(&self) -> f32 {
+        match *self {
+            Self::OpenBox { wall_m, .. } => wall_m,
+            Self::Bowl(bowl) => bowl.pitch_m(),
+            Self::Cuboid { .. } | Self::Cylinder { .. } | Self::Ball { .. } => self.half_extents_m().z,
+        }
+    }
+
+    /// From the body's centre up to where another body stands on it, or in it, in metres.
+    pub fn seat_m(&self) -> f32 {
+        if self.rim_m().is_some() { 0.0 } else { self.half_extents_m().z }
+    }
+
+    /// Whether a point, given about the body's centre, lies between walls and below twice the rim.
+    fn encloses(&self, point: &Vec3) -> bool {
+        let between_walls = match *self {
+            Self::OpenBox { inner_m: [half_x, half_y, _], .. } => point.x.abs() <= half_x && point.y.abs() <= half_y,
+            Self::Bowl(Bowl { rim_radius_m, .. }) => horizontal_distance(point, &Vec3::zeros()) <= rim_radius_m,
+            Self::Cuboid { .. } | Self::Cylinder { .. } | Self::Ball { .. } => false,
+        };
+        between_walls && self.rim_m().is_some_and(|rim_m| (-0.01..2.0 * rim_m).contains(&point.z))
     }
 }
 
@@ -64,7 +103,7 @@ impl Shape {
 pub enum Mobility {
     /// Pushed, grasped and dropped.
     Movable,
-    /// Bolted to the table.
+    /// Stays where it is as long as programs run.
     Fixed,
 }
 
@@ -140,18 +179,13 @@ impl SceneState {
     }
 }
 
-/// Whether a body's centre lies inside an open box: between its walls and below twice its rim.
+/// Whether a body's centre lies inside an open box or bowl: between its walls and below twice its rim.
 pub fn lies_inside(scene: &Scene, state: &SceneState, body: BodyIndex, container: BodyIndex) -> bool {
-    let Shape::OpenBox { inner_m: [half_x, half_y, height], .. } = scene.body(container).shape else {
-        return false;
-    };
     let body_in_container = state.body_in_world(container).inv_mul(state.body_in_world(body)).translation.vector;
-    body_in_container.x.abs() <= half_x
-        && body_in_container.y.abs() <= half_y
-        && (-0.01..2.0 * height).contains(&body_in_container.z)
+    scene.body(container).shape.encloses(&body_in_container)
 }
 
-/// Whether a body lies inside any open box of the scene.
+/// Whether a body lies inside any open box or bowl of the scene.
 pub fn lies_in_any_container(scene: &Scene, state: &SceneState, body: BodyIndex) -> bool {
     scene.body_indices().any(|container| container != body && lies_inside(scene, state, body, container))
 }

@@ -18,6 +18,7 @@
 
 mod act;
 mod adversary;
+mod carry;
 mod check;
 mod clock;
 mod config;
@@ -231,6 +232,11 @@ impl RobotApi for Simulation {
 
     fn settle(&mut self) -> SceneState {
         self.come_to_rest();
+        self.state()
+    }
+
+    fn carry(&mut self, tray: BodyIndex) -> SceneState {
+        self.carry_away(tray);
         self.state()
     }
 }

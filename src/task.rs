@@ -17,8 +17,8 @@ mod set;
 pub use file::TaskFileError;
 pub use goal::{Condition, Goal, condition_holds, goal_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
-pub use layout::{MAX_INSTANCES, Trial, initial_state, scene};
-pub use sampler::{SampleError, sample};
+pub use layout::{Trial, initial_state, scene};
+pub use sampler::{SampleError, sample, split_limits};
 pub use set::{TaskSet, TaskSetError};
 
 use std::fmt;
@@ -37,25 +37,29 @@ pub enum Family {
     BlockStacking,
     /// Objects of four categories are put into four containers.
     ObjectSorting,
+    /// Bowls are stacked on a tray and forks put into the topmost; the tray is carried away.
+    TableCleanup,
 }
 
 impl Family {
     /// Every family.
-    pub const ALL: [Self; 2] = [Self::BlockStacking, Self::ObjectSorting];
+    pub const ALL: [Self; 3] = [Self::BlockStacking, Self::ObjectSorting, Self::TableCleanup];
 
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::BlockStacking => "block_stacking",
             Self::ObjectSorting => "object_sorting",
+            Self::TableCleanup => "table_cleanup",
         }
     }
 
-    /// The start of suite names: `stacking_unseen`, `sorting_unseen`.
+    /// The start of suite names: `stacking_unseen`, `sorting_unseen`, `cleanup_unseen`.
     pub fn short_name(self) -> &'static str {
         match self {
             Self::BlockStacking => "stacking",
             Self::ObjectSorting => "sorting",
+            Self::TableCleanup => "cleanup",
         }
     }
 
@@ -64,12 +68,35 @@ impl Family {
         match self {
             Self::BlockStacking => Program::BlockStacking,
             Self::ObjectSorting => Program::ObjectSorting,
+            Self::TableCleanup => Program::TableCleanup,
         }
     }
 
     /// How many slots its scenes have.
     pub fn n_slots(self) -> usize {
-        8
+        match self {
+            Self::BlockStacking | Self::ObjectSorting => 8,
+            Self::TableCleanup => 6,
+        }
+    }
+
+    /// The most instances of one category that the table holds; nothing for a family without categories.
+    pub fn max_instances(self) -> Option<u16> {
+        match self {
+            Self::BlockStacking => None,
+            Self::ObjectSorting => Some(layout::MAX_INSTANCES),
+            Self::TableCleanup => Some(layout::cleanup::MAX_FORKS),
+        }
+    }
+
+    /// The most bowls that a task can ask for; nothing for a family without bowls.
+    pub fn max_bowls(self) -> Option<u16> {
+        (self == Self::TableCleanup).then_some(layout::cleanup::N_BOWLS)
+    }
+
+    /// The slot of what is carried away in the end, if anything is.
+    pub fn tray(self) -> Option<SlotIndex> {
+        (self == Self::TableCleanup).then_some(layout::cleanup::TRAY)
     }
 }
 
@@ -160,12 +187,31 @@ impl Task {
         conditions
     }
 
+    /// Counts of a trial, with what `draw` gives for each category; empty for a family without. Of Table Clean-up 1 for
+    /// each bowl that is asked for and 0 for the others, then the forks.
+    pub fn counts(&self, mut draw: impl FnMut() -> u16) -> Vec<u16> {
+        let is_asked_for = |bowl: u16| u16::from(self.goals.iter().any(|goal| goal.source == SlotIndex(bowl)));
+        match self.family {
+            Family::BlockStacking => Vec::new(),
+            Family::ObjectSorting => (0..check::N_CATEGORIES).map(|_| draw()).collect(),
+            Family::TableCleanup => (0..layout::cleanup::N_BOWLS).map(is_asked_for).chain([draw()]).collect(),
+        }
+    }
+
+    /// How many bowls it asks for; 0 in families without.
+    pub fn n_bowls(&self) -> u16 {
+        let is_bowl = |goal: &&Goal| goal.source.0 < self.family.max_bowls().unwrap_or(0);
+        self.goals.iter().filter(is_bowl).count() as u16
+    }
+
     /// The task in a sentence.
     pub fn text(&self) -> String {
         let slot = |index: SlotIndex| layout::slot_name(self.family, index);
-        let part = |goal: &Goal| match self.family {
-            Family::BlockStacking => format!("put {} on {}", slot(goal.source), slot(goal.target)),
-            Family::ObjectSorting => format!("put every {} into {}", slot(goal.source), slot(goal.target)),
+        let part = |goal: &Goal| match goal.brings_about(self.family) {
+            Condition::OnTop { upper, lower } => format!("put {} on {}", slot(upper), slot(lower)),
+            Condition::Inside { category, container } => {
+                format!("put every {} into {}", slot(category), slot(container))
+            }
         };
         self.goals.iter().map(part).collect::<Vec<_>>().join(", then ")
     }

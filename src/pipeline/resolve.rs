@@ -8,7 +8,7 @@ use crate::artifact;
 use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
-use crate::task::{Family, MAX_INSTANCES, Split};
+use crate::task::{Family, Split, split_limits};
 
 /// A checked pipeline.
 #[derive(Clone, Debug)]
@@ -18,10 +18,6 @@ pub struct Pipeline {
     /// Its settings.
     pub spec: PipelineSpec,
 }
-
-/// Tasks that a family has in all, where that is few enough to matter.
-const SORTING_TRAIN_TASKS: u32 = 4;
-const SORTING_UNSEEN_TASKS: u32 = 252;
 
 impl Pipeline {
     /// Reads and checks a pipeline file.
@@ -55,7 +51,7 @@ impl Pipeline {
     pub fn n_unseen(&self) -> u32 {
         let default = match self.spec.tasks.family {
             Family::BlockStacking => 1000,
-            Family::ObjectSorting => SORTING_UNSEEN_TASKS,
+            Family::ObjectSorting | Family::TableCleanup => split_limits(self.spec.tasks.family).1,
         };
         self.spec.tasks.unseen.unwrap_or(default)
     }
@@ -85,16 +81,22 @@ impl Pipeline {
         if let Some(path) = self.import_path().filter(|path| !path.is_file()) {
             return Err(self.value("tasks.import", format!("no such file: {}", path.display())));
         }
+        if tasks.import.is_some() {
+            return Ok(());
+        }
         let (train, unseen) = (tasks.train, self.n_unseen());
-        if tasks.family == Family::ObjectSorting && tasks.import.is_none() {
-            if train != SORTING_TRAIN_TASKS {
-                let problem = format!("is {train}; object_sorting has {SORTING_TRAIN_TASKS} training mappings");
-                return Err(self.value("tasks.train", problem));
-            }
-            if unseen > SORTING_UNSEEN_TASKS {
-                let problem = format!("is {unseen}; object_sorting has at most {SORTING_UNSEEN_TASKS} others");
-                return Err(self.value("tasks.unseen", problem));
-            }
+        let (train_limit, unseen_limit) = split_limits(tasks.family);
+        if tasks.family == Family::ObjectSorting && train != train_limit {
+            let problem = format!("is {train}; object_sorting has {train_limit} training mappings");
+            return Err(self.value("tasks.train", problem));
+        }
+        let name = tasks.family.name();
+        if train > train_limit {
+            let problem = format!("is {train}; {name} has at most {train_limit} training tasks");
+            return Err(self.value("tasks.train", problem));
+        }
+        if unseen > unseen_limit {
+            return Err(self.value("tasks.unseen", format!("is {unseen}; {name} has at most {unseen_limit} others")));
         }
         Ok(())
     }
@@ -115,12 +117,13 @@ impl Pipeline {
 
     fn check_counts(&self, key: &str, counts: Option<CountsSpec>) -> Result<(), PipelineError> {
         let Some(CountsSpec { min, max }) = counts else { return Ok(()) };
-        if self.spec.tasks.family == Family::BlockStacking {
-            return Err(self.value(key, "block_stacking has no categories; leave it out"));
-        }
-        if min < 1 || max > MAX_INSTANCES || min > max {
+        let family = self.spec.tasks.family;
+        let Some(most) = family.max_instances() else {
+            return Err(self.value(key, format!("{} has no categories; leave it out", family.name())));
+        };
+        if min < 1 || max > most || min > max {
             let problem = format!(
-                "is {min} to {max}; allowed is 1 <= min <= max <= {MAX_INSTANCES}, as many as the table holds of one category"
+                "is {min} to {max}; allowed is 1 <= min <= max <= {most}, as many as the table holds of one category"
             );
             return Err(self.value(key, problem));
         }
@@ -190,7 +193,20 @@ impl Pipeline {
         }
         self.check_towers(&key, suite)?;
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
-        self.check_counts(&key("on_table"), suite.on_table)
+        self.check_counts(&key("on_table"), suite.on_table)?;
+        self.check_bowls(&key("bowls"), suite.bowls)
+    }
+
+    fn check_bowls(&self, key: &str, bowls: Option<u16>) -> Result<(), PipelineError> {
+        let Some(bowls) = bowls else { return Ok(()) };
+        let family = self.spec.tasks.family;
+        match family.max_bowls() {
+            None => Err(self.value(key, format!("{} has no bowls; leave it out", family.name()))),
+            Some(most) if !(1..=most).contains(&bowls) => {
+                Err(self.value(key, format!("is {bowls}; allowed is 1 to {most}, as many as there are")))
+            }
+            Some(_) => Ok(()),
+        }
     }
 
     /// What is said of towers is said of a family that builds some.

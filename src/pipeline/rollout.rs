@@ -153,18 +153,20 @@ impl Learned {
     }
 }
 
-/// The tasks of a suite's split, in the suite's order of sub-tasks.
+/// The tasks that a suite asks for, in its order of sub-tasks.
 fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> Result<Vec<Task>, PipelineError> {
     let seed = Seed(context.pipeline.spec.seed);
     let ordered = |task: &Task| match spec.order {
         OrderSpec::Own => Some(task.clone()),
         OrderSpec::Shuffled => task.with_towers_shuffled(seed.derive(&format!("order/{}/{}", spec.name, task.id), &[])),
     };
-    let tasks: Vec<Task> = task_set.of_split(spec.split).filter_map(ordered).collect();
+    let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
+    let tasks: Vec<Task> = task_set.of_split(spec.split).filter(is_asked_for).filter_map(ordered).collect();
     if tasks.is_empty() {
-        let (field, problem) = match spec.order {
-            OrderSpec::Own => ("split", format!("is {}, but there is no such task", spec.split)),
-            OrderSpec::Shuffled => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),
+        let (field, problem) = match (spec.order, spec.bowls) {
+            (OrderSpec::Shuffled, _) => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),
+            (OrderSpec::Own, Some(bowls)) => ("bowls", format!("is {bowls}, but no {} task has as many", spec.split)),
+            (OrderSpec::Own, None) => ("split", format!("is {}, but there is no such task", spec.split)),
         };
         return Err(PipelineError::Value {
             path: context.pipeline.path.clone(),

@@ -70,7 +70,7 @@ pub enum RecordedFrames {
 pub struct CountsSpec {
     /// At least; from 1.
     pub min: u16,
-    /// At most; to 10.
+    /// At most; to 10, forks to 20.
     pub max: u16,
 }
 
@@ -176,6 +176,9 @@ pub struct SuiteSpec {
     /// Instances of each category on the table; as demonstrated when left out.
     #[serde(default)]
     pub on_table: Option<CountsSpec>,
+    /// Table Clean-up: only tasks with so many bowls; all when left out.
+    #[serde(default)]
+    pub bowls: Option<u16>,
     /// In which order towers are demonstrated.
     #[serde(default)]
     pub order: OrderSpec,

@@ -127,6 +127,7 @@ pub(super) fn program_to_proto(program: Program) -> proto::Program {
         Program::MoveTo => proto::Program::MoveTo,
         Program::Grip => proto::Program::Grip,
         Program::Release => proto::Program::Release,
+        Program::TableCleanup => proto::Program::TableCleanup,
     }
 }
 
@@ -146,5 +147,6 @@ pub(super) fn program_from_proto(number: i32) -> Result<Program, MessageProblem>
         proto::Program::MoveTo => Ok(Program::MoveTo),
         proto::Program::Grip => Ok(Program::Grip),
         proto::Program::Release => Ok(Program::Release),
+        proto::Program::TableCleanup => Ok(Program::TableCleanup),
     }
 }

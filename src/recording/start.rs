@@ -2,7 +2,7 @@
 
 use super::error::MessageProblem;
 use super::schema::proto::{self, body};
-use crate::scene::{Body, BodyIndex, Mobility, Scene, Shape, Slot};
+use crate::scene::{Body, BodyIndex, Bowl, Mobility, Scene, Shape, Slot};
 use crate::trace::{Actor, EpisodeParts, Provenance};
 
 /// What an `EpisodeStart` holds.
@@ -70,6 +70,16 @@ fn encode_shape(shape: &Shape) -> body::Shape {
         Shape::Ball { radius_m } => body::Shape::Ball(proto::Ball { radius_m }),
         Shape::OpenBox { inner_m: [inner_half_x_m, inner_half_y_m, inner_height_m], wall_m } => {
             body::Shape::OpenBox(proto::OpenBox { inner_half_x_m, inner_half_y_m, inner_height_m, wall_m })
+        }
+        Shape::Bowl(Bowl { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m }) => {
+            body::Shape::Bowl(proto::Bowl {
+                floor_radius_m,
+                rim_radius_m,
+                height_m,
+                wall_m,
+                foot_radius_m,
+                foot_height_m,
+            })
         }
     }
 }
@@ -146,6 +156,14 @@ fn decode_shape(shape: &body::Shape) -> Shape {
         body::Shape::OpenBox(proto::OpenBox { inner_half_x_m, inner_half_y_m, inner_height_m, wall_m }) => {
             Shape::OpenBox { inner_m: [inner_half_x_m, inner_half_y_m, inner_height_m], wall_m }
         }
+        body::Shape::Bowl(proto::Bowl {
+            floor_radius_m,
+            rim_radius_m,
+            height_m,
+            wall_m,
+            foot_radius_m,
+            foot_height_m,
+        }) => Shape::Bowl(Bowl { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m }),
     }
 }
 

@@ -1,13 +1,14 @@
 //! Messages for people: what Foxglove and Rerun show of an episode beside its data. No reader of ours needs them.
 
 use super::schema::foxglove::{
-    Color, CubePrimitive, CylinderPrimitive, Event, KeyValuePair, Log, Pose, Quaternion, SceneEntity,
-    SceneEntityDeletion, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3, log, scene_entity_deletion,
+    Color, CubePrimitive, CylinderPrimitive, Event, KeyValuePair, Log, Point3, Pose, Quaternion, SceneEntity,
+    SceneEntityDeletion, SceneUpdate, SpherePrimitive, TextPrimitive, TriangleListPrimitive, Vector3, log,
+    scene_entity_deletion,
 };
 use super::schema::{Timestamp, program_to_proto, proto, timestamp};
 use super::transform::{GRIPPER, WORLD};
 use crate::program::Program;
-use crate::scene::{Body, Scene, Shape};
+use crate::scene::{Body, Prism, Scene, Shape};
 use crate::trace::{Episode, ProgramCall, Provenance};
 
 const TABLE_COLOR: [u8; 3] = [205, 196, 180];
@@ -73,6 +74,7 @@ fn body_entity(stamp: Timestamp, body: &Body, labelled: bool) -> SceneEntity {
             color: Some(color(body.color)),
         }),
         Shape::OpenBox { inner_m, wall_m } => entity.cubes.extend(box_cubes(inner_m, wall_m, body.color)),
+        Shape::Bowl(bowl) => entity.triangles.extend(bowl.prisms().iter().map(|prism| triangles(prism, body.color))),
     }
     if labelled {
         let height = 2.0 * body.shape.half_extents_m().z + 0.01;
@@ -99,6 +101,20 @@ fn box_cubes([half_x, half_y, height]: [f32; 3], wall: f32, rgb: [u8; 3]) -> [Cu
         cube([outer_x, wall, height], [0.0, wall_y, middle], rgb),
         cube([outer_x, wall, height], [0.0, -wall_y, middle], rgb),
     ]
+}
+
+fn triangles(prism: &Prism, rgb: [u8; 3]) -> TriangleListPrimitive {
+    let point = |corner: [f32; 3]| {
+        let [x, y, z] = corner.map(f64::from);
+        Point3 { x, y, z }
+    };
+    TriangleListPrimitive {
+        pose: Some(at([0.0; 3])),
+        points: prism.corners().into_iter().map(point).collect(),
+        color: Some(color(rgb)),
+        colors: Vec::new(),
+        indices: prism.triangles().into_iter().flatten().collect(),
+    }
 }
 
 fn gripper_cubes() -> Vec<CubePrimitive> {

@@ -9,10 +9,10 @@ use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
 use crate::model::Decisions;
 use crate::program::Program;
-use crate::robot::{Action, RobotApi};
+use crate::robot::{Action, RobotApi, judge};
 use crate::rollout::divergence::divergence;
 use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
-use crate::task::{Task, goal_holds};
+use crate::task::Task;
 use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Push, TraceError};
 
 /// An episode about to be acted: a demonstration, and a world of another trial.
@@ -184,13 +184,10 @@ impl<'t> Running<'t> {
     }
 
     fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
-        let at_rest = self.world.settle();
-        let reached = goal_holds(self.world.scene(), &at_rest, &self.task.conditions);
-        let fault = self.first_fault.map(|(_, cause)| cause);
-        let outcome = match (self.gave_up, reached) {
-            (false, true) => Outcome::Success,
-            (false, false) => Outcome::Failure(fault.unwrap_or(Cause::EndedEarly)),
-            (true, _) => Outcome::Failure(fault.unwrap_or(Cause::NeverEnded)),
+        let ended = if self.gave_up { Err(Cause::NeverEnded) } else { judge(self.task, self.world.as_mut()) };
+        let outcome = match ended {
+            Ok(()) => Outcome::Success,
+            Err(cause) => Outcome::Failure(self.first_fault.map_or(cause, |(_, fault)| fault)),
         };
         let frame = self.frame();
         let calls = self.calls.finish(frame);

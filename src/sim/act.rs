@@ -2,13 +2,14 @@
 
 use rapier3d::math::{Pose as EnginePose, Vector};
 
-use crate::robot::{Action, GRASP_M, HOVER_M};
-use crate::scene::{BodyIndex, Mobility, Shape, SlotIndex};
+use crate::robot::{Action, HOVER_M};
+use crate::scene::{BodyIndex, Mobility, SlotIndex};
 use crate::sim::Simulation;
+use crate::sim::drop_spot;
+use crate::sim::grasp::{self, Grasp};
 use crate::sim::gripper::{Gripper, MAX_OPENING_M, PALM_M, TIP_M};
 use crate::sim::motion::{Motion, Tool};
 use crate::sim::sweep::AtStart;
-use crate::sim::{drop_spot, grasp};
 use crate::trace::Cause;
 
 /// Least height of gripper and load above everything on the way across, in metres.
@@ -25,7 +26,7 @@ const LIFT_OFF_M: f32 = 0.008;
 const TOUCH_M: f32 = 0.000_3;
 /// Speed of each closing finger, in metres per second.
 const CLOSE_M_PER_S: f32 = 0.25;
-const SPARE_TICKS: u32 = 4;
+const SPARE_TICKS: u32 = 12;
 
 /// What is known of the way ahead.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -57,17 +58,13 @@ impl Simulation {
             return Err(Cause::TimeLimit);
         };
         let target = self.body_in_world(body).translation;
-        let rim_m = match self.scene.body(body).shape {
-            Shape::OpenBox { inner_m: [_, _, height], .. } => height,
-            _ => 0.0,
-        };
-        let hover_z = target.z + rim_m + HOVER_M;
+        let hover_z = target.z + self.scene.body(body).shape.rim_m().unwrap_or(0.0) + HOVER_M;
         let held = self.gripper.held_handle();
         let lowest_z = self.gripper.lowest_z(&self.world);
         let below_m = self.gripper.tool.position.z - lowest_z;
         let transit_z = (self.world.top_z(held) + below_m + CLEARANCE_M).max(hover_z).max(self.gripper.tool.position.z);
         self.rise(transit_z);
-        let over = Vector::new(target.x, target.y, transit_z);
+        let over = Vector::new(target.x, target.y, transit_z) - self.gripper.hangs_beside(&self.scene);
         self.follow(Tool { position: over, yaw_rad: 0.0, ..self.gripper.tool }, |_| Air::Clear);
         self.sink(hover_z, CLEARANCE_M);
         Ok(())
@@ -85,10 +82,14 @@ impl Simulation {
             self.close_on_air();
             return self.miss();
         };
-        let yaw_rad = self.grasp_yaw_rad(body);
-        self.follow(Tool { yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
-        self.sink(self.world.in_world(body).translation.z + GRASP_M, 0.0);
-        if !self.close_on(body) || !grasp::is_between_fingers(&self.gripper.tool, &self.world.in_world(body)) {
+        let shape = self.scene.body(body).shape;
+        let grasp = self.plan_grasp(body);
+        self.follow(Tool { yaw_rad: grasp.yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
+        if !self.shift(grasp.position) {
+            return self.miss();
+        }
+        self.sink(grasp.position.z, 0.0);
+        if !self.close_on(body) || !grasp::is_between_fingers(&shape, &self.gripper.tool, &self.world.in_world(body)) {
             return self.miss();
         }
         self.gripper.hold(&mut self.world, body);
@@ -96,17 +97,18 @@ impl Simulation {
         Ok(())
     }
 
-    /// The turn with which the open fingers can go down beside a body; the nearest when they never can.
-    fn grasp_yaw_rad(&self, body: BodyIndex) -> f32 {
+    /// How to close on a body: with the turn with which the open fingers can go down beside it; the nearest when they
+    /// never can.
+    fn plan_grasp(&self, body: BodyIndex) -> Grasp {
         let tool = self.gripper.tool;
-        let in_world = self.world.in_world(body);
-        let yaws = grasp::yaws_rad(&self.scene.body(body).shape, &in_world, tool.yaw_rad);
-        let down = Vector::new(0.0, 0.0, (in_world.translation.z + GRASP_M - tool.position.z).min(0.0));
-        let is_free = |yaw_rad: &&f32| {
-            let turned = Tool { yaw_rad: **yaw_rad, ..tool };
+        let plans = Grasp::plans(&self.scene.body(body).shape, &self.world.in_world(body), &tool);
+        let is_free = |grasp: &&Grasp| {
+            let turned = Tool { yaw_rad: grasp.yaw_rad, ..tool };
+            let down = Vector::new(0.0, 0.0, (grasp.position.z - tool.position.z).min(0.0));
             self.gripper.free_way_m(&self.world, &turned, down, AtStart::Stops) >= down.length()
         };
-        yaws.iter().find(is_free).or(yaws.first()).copied().unwrap_or(tool.yaw_rad)
+        let as_it_is = Grasp { position: tool.position, yaw_rad: tool.yaw_rad };
+        plans.iter().find(is_free).or(plans.first()).copied().unwrap_or(as_it_is)
     }
 
     fn miss(&mut self) -> Result<(), Cause> {
@@ -115,15 +117,12 @@ impl Simulation {
     }
 
     fn release(&mut self) -> Result<(), Cause> {
-        let gap_m = match drop_spot::container_below(&self.scene, &self.world, &self.gripper.tool) {
+        let gap_m = match drop_spot::container_below(&self.scene, &self.world, &self.gripper) {
             None => SET_DOWN_M,
             Some(container) => {
+                self.gripper.opens_to_m = drop_spot::opening_m(&self.scene, &self.gripper, container);
                 let spot = drop_spot::choose(&self.scene, &self.world, &self.gripper, container);
-                let way = spot - self.gripper.tool.position;
-                let free_m = self.gripper.free_way_m(&self.world, &self.gripper.tool, way, AtStart::MayLeave);
-                if free_m >= way.length() {
-                    self.follow(Tool { position: spot, ..self.gripper.tool }, |_| Air::Clear);
-                }
+                self.shift(spot);
                 DROP_M
             }
         };
@@ -132,8 +131,8 @@ impl Simulation {
         let Some(body) = self.gripper.let_go(&mut self.world) else {
             return Err(Cause::DroppedObject);
         };
-        let opening =
-            Motion::new(self.gripper.tool, Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, &self.config);
+        let open = Tool { opening_m: self.gripper.opens_to_m, ..self.gripper.tool };
+        let opening = Motion::new(self.gripper.tool, open, &self.config);
         for step in 1..=opening.n_steps {
             self.tick(opening.at(step), Air::Unknown);
         }
@@ -153,6 +152,7 @@ impl Simulation {
     }
 
     fn open(&mut self) {
+        self.gripper.opens_to_m = MAX_OPENING_M;
         self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, |_| Air::Unknown);
     }
 
@@ -179,6 +179,18 @@ impl Simulation {
             self.tick(Tool { opening_m, ..tool }, Air::Unknown);
         }
         false
+    }
+
+    /// Level to above a place; whether the way was free, else nothing moves.
+    fn shift(&mut self, place: Vector) -> bool {
+        let tool = self.gripper.tool;
+        let over = Vector::new(place.x, place.y, tool.position.z);
+        let way = over - tool.position;
+        let is_free = self.gripper.free_way_m(&self.world, &tool, way, AtStart::MayLeave) >= way.length();
+        if is_free {
+            self.follow(Tool { position: over, ..tool }, |_| Air::Clear);
+        }
+        is_free
     }
 
     /// Straight up to a height; not at all when it is higher already.

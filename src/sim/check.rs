@@ -95,7 +95,9 @@ fn check_overlaps(scene: &Scene, initial: &SceneState, tool: &Tool) -> Result<()
     let in_world = |parts: Vec<Part>, pose: EnginePose| {
         parts.into_iter().map(|part| (part.clone(), pose * part.in_body)).collect::<Vec<_>>()
     };
-    let gripper = hull(tool).into_iter().map(|(shape, pose)| (Part { in_body: EnginePose::IDENTITY, shape }, pose));
+    let gripper = hull(tool, MAX_OPENING_M)
+        .into_iter()
+        .map(|(shape, pose)| (Part { in_body: EnginePose::IDENTITY, shape }, pose));
     let mut solids = vec![Solid { name: "gripper", parts: gripper.collect() }];
     for (body, pose) in scene.bodies.iter().zip(&initial.bodies_in_world) {
         solids.push(Solid { name: &body.name, parts: in_world(parts(&body.shape), to_engine(pose)) });

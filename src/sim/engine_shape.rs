@@ -5,7 +5,7 @@ use rapier3d::geometry::SharedShape;
 use rapier3d::math::{Pose as EnginePose, Rotation, Vector};
 
 use crate::geometry::Pose;
-use crate::scene::Shape;
+use crate::scene::{Bowl, Prism, Shape};
 
 /// A pose for the engine.
 pub(super) fn to_engine(pose: &Pose) -> EnginePose {
@@ -47,9 +47,15 @@ impl Part {
         let [x, y, z] = half;
         Self { in_body: EnginePose::from_translation(center.into()), shape: SharedShape::cuboid(x, y, z) }
     }
+
+    /// Nothing for a prism without volume, which no checked scene has.
+    fn prism(prism: &Prism) -> Option<Self> {
+        let corners: Vec<Vector> = prism.corners().into_iter().map(Vector::from).collect();
+        Some(Self { in_body: EnginePose::IDENTITY, shape: SharedShape::convex_hull(&corners)? })
+    }
 }
 
-/// The convex parts of a shape: one, or the floor and four walls of an open box.
+/// The convex parts of a shape: one, the floor and four walls of an open box, or foot, floor and eight walls of a bowl.
 pub(super) fn parts(shape: &Shape) -> Vec<Part> {
     match *shape {
         Shape::Cuboid { half_extents_m } => vec![Part::cuboid([0.0; 3], half_extents_m)],
@@ -73,6 +79,7 @@ pub(super) fn parts(shape: &Shape) -> Vec<Part> {
                 Part::cuboid([0.0, -y - half_wall, wall_z], [x, half_wall, half_wall_height]),
             ]
         }
+        Shape::Bowl(bowl) => bowl.prisms().iter().filter_map(Part::prism).collect(),
     }
 }
 
@@ -83,5 +90,8 @@ pub(super) fn sizes_m(shape: &Shape) -> Vec<f32> {
         Shape::Cylinder { radius_m, half_height_m } => vec![radius_m, half_height_m],
         Shape::Ball { radius_m } => vec![radius_m],
         Shape::OpenBox { inner_m: [x, y, height], wall_m } => vec![x, y, height, wall_m],
+        Shape::Bowl(Bowl { floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m }) => {
+            vec![floor_radius_m, rim_radius_m, height_m, wall_m, foot_radius_m, foot_height_m]
+        }
     }
 }

@@ -10,12 +10,12 @@
 //! the engine's gripper catches up before the next step. The simulated time is the same either way.
 
 use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle, RigidBody, RigidBodyBuilder, RigidBodyHandle};
-use rapier3d::geometry::{ColliderBuilder, Group, SharedShape};
+use rapier3d::geometry::{Collider, ColliderBuilder, Group, SharedShape};
 use rapier3d::math::{Pose as EnginePose, Vector};
 use rapier3d::parry::query::distance;
 use rapier3d::parry::shape::Cuboid;
 
-use crate::scene::BodyIndex;
+use crate::scene::{BodyIndex, Scene};
 use crate::sim::motion::Tool;
 use crate::sim::sweep::AtStart;
 use crate::sim::world::{GRIPPER_GROUP, SCENE_GROUP, World, groups};
@@ -31,7 +31,7 @@ const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, (TIP_M + PALM_M) / 2.0];
 const PALM_HALF_M: [f32; 3] = [0.013, 0.044, 0.008];
 const FINGER_FRICTION: f32 = 0.6;
 /// From the gripper's axis to a fully open finger's outer side, in metres.
-pub(super) const OPEN_REACH_M: f32 = MAX_OPENING_M / 2.0 + 2.0 * FINGER_HALF_M[1];
+pub(super) const OPEN_REACH_M: f32 = reach_m(MAX_OPENING_M);
 /// Half of the palm's width along the fingers' flat side, in metres.
 pub(super) const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
 /// How far a held body may shift before it counts as lost, in metres.
@@ -63,9 +63,16 @@ enum Engine {
 pub(super) struct Gripper {
     pub(super) tool: Tool,
     pub(super) held: Option<Held>,
+    /// How far the fingers will open next: their way is kept clear so far.
+    pub(super) opens_to_m: f32,
     palm: RigidBodyHandle,
     fingers: [RigidBodyHandle; 2],
     engine: Engine,
+}
+
+/// From the gripper's axis to a finger's outer side, in metres.
+pub(super) const fn reach_m(opening_m: f32) -> f32 {
+    opening_m / 2.0 + 2.0 * FINGER_HALF_M[1]
 }
 
 /// The two sides that the fingers are on.
@@ -81,7 +88,7 @@ impl Gripper {
         };
         let palm = insert(PALM_HALF_M, palm_in_world(&tool));
         let fingers = SIDES.map(|side| insert(FINGER_HALF_M, finger_in_world(&tool, side)));
-        Self { tool, held: None, palm, fingers, engine: Engine::Current }
+        Self { tool, held: None, opens_to_m: MAX_OPENING_M, palm, fingers, engine: Engine::Current }
     }
 
     /// Moves in free flight; see the module.
@@ -128,19 +135,30 @@ impl Gripper {
     /// Height of the lowest point of gripper and load.
     pub(super) fn lowest_z(&self, world: &World) -> f32 {
         let tips_z = self.tool.position.z - TIP_M;
-        self.carried(world, &self.tool).map_or(tips_z, |(shape, pose)| tips_z.min(shape.compute_aabb(&pose).mins.z))
+        let parts = self.carried(world, &self.tool);
+        parts.iter().map(|(shape, pose)| shape.compute_aabb(pose).mins.z).fold(tips_z, f32::min)
     }
 
-    /// What is held as it would be with the gripper at `tool`.
-    pub(super) fn carried(&self, world: &World, tool: &Tool) -> Option<(SharedShape, EnginePose)> {
-        let held = self.held?;
-        let collider = &world.engine.colliders[world.collider(held.body)];
-        let in_body = collider.position_wrt_parent().copied().unwrap_or(EnginePose::IDENTITY);
-        Some((collider.shared_shape().clone(), tool.in_world() * held.in_gripper * in_body))
+    /// The parts of what is held as they would be with the gripper at `tool`; none with nothing held.
+    pub(super) fn carried(&self, world: &World, tool: &Tool) -> Vec<(SharedShape, EnginePose)> {
+        let Some(held) = self.held else { return Vec::new() };
+        let part = |collider: &Collider| {
+            let in_body = collider.position_wrt_parent().copied().unwrap_or(EnginePose::IDENTITY);
+            (collider.shared_shape().clone(), tool.in_world() * held.in_gripper * in_body)
+        };
+        world.colliders(held.body).map(part).collect()
     }
 
     pub(super) fn held_handle(&self) -> Option<RigidBodyHandle> {
         self.held.map(|held| held.handle)
+    }
+
+    /// How far, level, a body that is held at its rim hangs beside the gripper when that is turned to 0; nothing for
+    /// what is held at its middle.
+    pub(super) fn hangs_beside(&self, scene: &Scene) -> Vector {
+        let at_rim = self.held.filter(|held| scene.body(held.body).shape.rim_m().is_some());
+        at_rim
+            .map_or(Vector::ZERO, |held| Vector::new(held.in_gripper.translation.x, held.in_gripper.translation.y, 0.0))
     }
 
     /// Fixes a body to the palm as they are now. Contacts between the two end: the joint does the fingers' work.
@@ -150,8 +168,7 @@ impl Gripper {
         let in_palm = palm_in_world(&self.tool).inv_mul(&world.in_world(body));
         let joint = FixedJointBuilder::new().local_frame1(in_palm).contacts_enabled(false);
         let joint = world.engine.insert_impulse_joint(self.palm, handle, joint);
-        let collider = world.collider(body);
-        world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, SCENE_GROUP));
+        world.set_groups(body, groups(SCENE_GROUP, SCENE_GROUP));
         // What the fingers' push left it with must not be set free when it is let go.
         stop(&mut world.engine.bodies[handle]);
         let in_gripper = self.tool.in_world().inv_mul(&world.in_world(body));
@@ -169,8 +186,7 @@ impl Gripper {
 
     /// Lets a body that was let go collide with the gripper again.
     pub(super) fn part_from(world: &mut World, body: BodyIndex) {
-        let collider = world.collider(body);
-        world.engine.colliders[collider].set_collision_groups(groups(SCENE_GROUP, Group::ALL));
+        world.set_groups(body, groups(SCENE_GROUP, Group::ALL));
     }
 
     /// After a step of the engine: whether what is held was torn out of the grasp, because it has shifted or because
@@ -191,11 +207,13 @@ impl Gripper {
     pub(super) fn finger_gaps_m(&self, world: &World, body: BodyIndex) -> [f32; 2] {
         let [x, y, z] = FINGER_HALF_M;
         let finger = Cuboid::new(Vector::new(x, y, z));
-        let target = &world.engine.colliders[world.collider(body)];
         SIDES.map(|side| {
             let pose = finger_in_world(&self.tool, side);
-            let found = distance(&pose, &finger, target.position(), target.shape());
-            found.map_or(f32::MAX, |found| found.distance)
+            let gap_m = |part: &Collider| {
+                let found = distance(&pose, &finger, part.position(), part.shape());
+                found.map_or(f32::MAX, |found| found.distance)
+            };
+            world.colliders(body).map(gap_m).fold(f32::MAX, f32::min)
         })
     }
 
@@ -214,7 +232,7 @@ impl Gripper {
     /// when it meets nothing.
     pub(super) fn free_way_m(&self, world: &World, tool: &Tool, path: Vector, at_start: AtStart) -> f32 {
         let held = self.held_handle();
-        let parts = hull(tool).into_iter().chain(self.carried(world, tool));
+        let parts = hull(tool, self.opens_to_m).into_iter().chain(self.carried(world, tool));
         parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
     }
 }
@@ -233,12 +251,12 @@ fn finger_in_world(tool: &Tool, side: f32) -> EnginePose {
     tool.in_world() * EnginePose::translation(0.0, y, (PALM_M - TIP_M) / 2.0)
 }
 
-/// The gripper's parts as they are swept by opening the fingers all the way: what is clear of these stays clear of
-/// the fingers when they open.
-pub(super) fn hull(tool: &Tool) -> [(SharedShape, EnginePose); 3] {
+/// The gripper's parts as they are swept by opening the fingers so far: what is clear of these stays clear of the
+/// fingers when they open.
+pub(super) fn hull(tool: &Tool, opens_to_m: f32) -> [(SharedShape, EnginePose); 3] {
     let [x, thickness, z] = FINGER_HALF_M;
-    let inner = tool.opening_m.min(MAX_OPENING_M) / 2.0;
-    let outer = (MAX_OPENING_M.max(tool.opening_m)) / 2.0 + 2.0 * thickness;
+    let inner = tool.opening_m.min(opens_to_m) / 2.0;
+    let outer = (opens_to_m.max(tool.opening_m)) / 2.0 + 2.0 * thickness;
     let finger = |side: f32| {
         let pose = EnginePose::translation(0.0, side * (inner + outer) / 2.0, (PALM_M - TIP_M) / 2.0);
         (SharedShape::cuboid(x, (outer - inner) / 2.0, z), tool.in_world() * pose)

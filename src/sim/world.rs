@@ -12,7 +12,9 @@
 //! [`REST_M_PER_S`] and of the balls' damping, two of five sortings of 40 objects never came to rest.
 
 use rapier3d::dynamics::{ImpulseJointHandle, RigidBody, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients};
-use rapier3d::geometry::{ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, Ray};
+use rapier3d::geometry::{
+    Collider, ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, Ray,
+};
 use rapier3d::math::{Pose as EnginePose, Vector};
 use rapier3d::parry::bounding_volume::BoundingVolume as _;
 use rapier3d::parry::shape::Shape as EngineShape;
@@ -101,9 +103,25 @@ impl World {
         &self.engine.bodies[self.handle(index)]
     }
 
-    /// The collider of a movable body: its only one.
-    pub(super) fn collider(&self, index: BodyIndex) -> ColliderHandle {
-        self.body(index).colliders()[0]
+    /// The colliders of a body, one a convex part.
+    pub(super) fn colliders(&self, index: BodyIndex) -> impl Iterator<Item = &Collider> {
+        self.body(index).colliders().iter().map(|&handle| &self.engine.colliders[handle])
+    }
+
+    /// Sets what a body's colliders are and what they touch.
+    pub(super) fn set_groups(&mut self, index: BodyIndex, groups: InteractionGroups) {
+        for handle in self.body(index).colliders().to_vec() {
+            self.engine.colliders[handle].set_collision_groups(groups);
+        }
+    }
+
+    /// Wakes everything that can move.
+    pub(super) fn wake_all(&mut self) {
+        for &handle in &self.bodies {
+            if self.engine.bodies[handle].is_dynamic() {
+                self.engine.wake_up(handle, true);
+            }
+        }
     }
 
     /// Where a body is.

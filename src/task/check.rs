@@ -3,19 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::scene::SlotIndex;
+use crate::task::layout::cleanup::{FORK, TRAY};
 use crate::task::layout::slot_name;
 use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
 
 /// How many slots of Object Sorting are categories; the others are containers.
 pub(super) const N_CATEGORIES: u16 = 4;
-
-/// What a goal brings about.
-pub(super) fn condition_of(family: Family, goal: Goal) -> Condition {
-    match family {
-        Family::BlockStacking => Condition::OnTop { upper: goal.source, lower: goal.target },
-        Family::ObjectSorting => Condition::Inside { category: goal.source, container: goal.target },
-    }
-}
 
 /// See [`TaskSet::validate`].
 pub(super) fn check(set: &TaskSet) -> Result<(), TaskSetError> {
@@ -47,10 +40,10 @@ fn check_task(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     }
     check_slots(task_idx, task)?;
     check_moves(task_idx, task)?;
-    if task.family == Family::BlockStacking {
+    if task.family != Family::ObjectSorting {
         check_towers(task_idx, task)?;
     }
-    let brought: Vec<Condition> = task.goals.iter().map(|&goal| condition_of(task.family, goal)).collect();
+    let brought: Vec<Condition> = task.goals.iter().map(|&goal| goal.brings_about(task.family)).collect();
     match task.conditions.iter().position(|condition| !brought.contains(condition)) {
         Some(at) => Err(TaskSetError::ConditionWithoutGoal { place: format!("tasks[{task_idx}].conditions[{at}]") }),
         None => Ok(()),
@@ -64,8 +57,8 @@ fn goal_place(task_idx: usize, goal_idx: usize) -> String {
 fn check_slots(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     for (goal_idx, goal) in task.goals.iter().enumerate() {
         let place = goal_place(task_idx, goal_idx);
-        check_slot(task.family, &format!("{place}.source"), goal.source, "category")?;
-        check_slot(task.family, &format!("{place}.target"), goal.target, "container")?;
+        check_slot(task.family, &format!("{place}.source"), goal.source, Part::Source)?;
+        check_slot(task.family, &format!("{place}.target"), goal.target, Part::Target)?;
         if goal.source == goal.target {
             return Err(TaskSetError::OwnTarget { place, slot: slot_name(task.family, goal.source) });
         }
@@ -73,16 +66,27 @@ fn check_slots(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     Ok(())
 }
 
-fn check_slot(family: Family, place: &str, slot: SlotIndex, expected: &'static str) -> Result<(), TaskSetError> {
+/// What a slot is in a goal.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Source,
+    Target,
+}
+
+fn check_slot(family: Family, place: &str, slot: SlotIndex, part: Part) -> Result<(), TaskSetError> {
     let place = place.to_owned();
     if usize::from(slot.0) >= family.n_slots() {
         return Err(TaskSetError::SlotOutOfRange { place, slot, n_slots: family.n_slots() });
     }
-    let kind = if slot.0 < N_CATEGORIES { "category" } else { "container" };
-    if family == Family::ObjectSorting && kind != expected {
-        return Err(TaskSetError::WrongKind { place, slot: slot_name(family, slot), expected });
-    }
-    Ok(())
+    let is_category = slot.0 < N_CATEGORIES;
+    let (fits, expected) = match (family, part) {
+        (Family::BlockStacking, _) => (true, "block"),
+        (Family::ObjectSorting, Part::Source) => (is_category, "category"),
+        (Family::ObjectSorting, Part::Target) => (!is_category, "container"),
+        (Family::TableCleanup, Part::Source) => (slot != TRAY, "bowl or fork"),
+        (Family::TableCleanup, Part::Target) => (slot != FORK, "bowl or tray"),
+    };
+    if fits { Ok(()) } else { Err(TaskSetError::WrongKind { place, slot: slot_name(family, slot), expected }) }
 }
 
 fn check_moves(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
@@ -115,7 +119,7 @@ fn check_towers(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     Ok(())
 }
 
-/// The first ring of blocks that stand on each other. Each block stands on one at most, so walking down ends on the
+/// The first ring of bodies that stand on each other. Each stands on one at most, so walking down ends on the
 /// table or in a ring.
 fn ring(goals: &[Goal]) -> Option<Vec<SlotIndex>> {
     let below = |slot: SlotIndex| goals.iter().find(|goal| goal.source == slot).map(|goal| goal.target);

@@ -93,11 +93,11 @@ struct GoalEntry {
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 enum ConditionEntry {
-    /// One block rests on another.
+    /// One body rests on another, or in it if that is a bowl or tray.
     OnTop {
-        /// Name of the block on top.
+        /// Name of the body on top.
         upper: String,
-        /// Name of the block below.
+        /// Name of the body below.
         lower: String,
     },
     /// Every instance of a category lies in a container.

@@ -7,6 +7,8 @@
 
 use crate::geometry::{Vec3, horizontal_distance};
 use crate::scene::{Scene, SceneState, SlotIndex, lies_inside};
+use crate::task::Family;
+use crate::task::layout::cleanup::FORK;
 
 /// One sub-task: bring what `source` shows onto or into what `target` shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -15,6 +17,23 @@ pub struct Goal {
     pub source: SlotIndex,
     /// The slot to bring it to.
     pub target: SlotIndex,
+}
+
+impl Goal {
+    /// What it brings about in a family.
+    pub fn brings_about(self, family: Family) -> Condition {
+        let Self { source, target } = self;
+        let is_category = match family {
+            Family::BlockStacking => false,
+            Family::ObjectSorting => true,
+            Family::TableCleanup => source == FORK,
+        };
+        if is_category {
+            Condition::Inside { category: source, container: target }
+        } else {
+            Condition::OnTop { upper: source, lower: target }
+        }
+    }
 }
 
 /// Something that must hold in the end.
@@ -36,9 +55,10 @@ pub enum Condition {
     },
 }
 
-/// Largest horizontal distance between the centres of two stacked blocks, in metres (the authors' value).
+/// Largest horizontal distance between the centres of two stacked bodies, in metres (the authors' value).
+/// Bowls nest, so their walls keep them much nearer.
 const MAX_STACK_OFFSET_M: f32 = 0.05;
-/// Largest deviation from the height that a stacked block should have above its lower one, in metres.
+/// Largest deviation from the height that a stacked body should have above its lower one, in metres.
 const MAX_STACK_HEIGHT_ERROR_M: f32 = 0.01;
 
 /// Whether a body rests on another, by their centres, which are `height_m` above each other when it does.
@@ -54,7 +74,7 @@ pub fn condition_holds(scene: &Scene, state: &SceneState, condition: &Condition)
         Condition::OnTop { upper, lower } => bodies(upper).zip(bodies(lower)).all(|(upper, lower)| {
             let above = state.body_in_world(upper).translation.vector;
             let below = state.body_in_world(lower).translation.vector;
-            let expected = scene.body(upper).shape.half_extents_m().z + scene.body(lower).shape.half_extents_m().z;
+            let expected = scene.body(upper).shape.foot_m() + scene.body(lower).shape.seat_m();
             rests_on(&above, &below, expected) && state.held != Some(upper)
         }),
         Condition::Inside { category, container } => bodies(container).all(|container| {

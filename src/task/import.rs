@@ -18,7 +18,6 @@ use serde_json::Value;
 
 use crate::artifact::{self, IoError};
 use crate::scene::SlotIndex;
-use crate::task::check::condition_of;
 use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
 
 /// A task file of the authors' that cannot be taken.
@@ -227,7 +226,7 @@ fn goal_family(node: &Node<'_>) -> Result<Family, Problem> {
 fn condition(node: &Node<'_>, objects: &[&str], family: Family) -> Result<Condition, Problem> {
     let kind = node.field("type")?;
     match kind.text()? {
-        "on_top" => Ok(condition_of(family, pair(node, objects)?)),
+        "on_top" => Ok(pair(node, objects)?.brings_about(family)),
         other => Err(kind.unknown("constraint type", other, "on_top")),
     }
 }

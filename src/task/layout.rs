@@ -4,10 +4,12 @@
 //!
 //! Metres; world frame, the table's surface at z = 0.
 
+pub(super) mod cleanup;
+
 use rand::Rng as _;
 use rand::seq::SliceRandom as _;
 
-use crate::geometry::{Vec3, horizontal_distance, upright};
+use crate::geometry::{Pose, Vec3, horizontal_distance, upright};
 use crate::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
 use crate::task::Family;
@@ -37,7 +39,7 @@ const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
 
 /// The most instances of one category.
-pub const MAX_INSTANCES: u16 = 10;
+pub(super) const MAX_INSTANCES: u16 = 10;
 
 const BLOCK_LETTERS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
 const BLOCK_COLORS: [[u8; 3]; 8] = [
@@ -60,7 +62,7 @@ const CONTAINER_COLORS: [[u8; 3]; 4] = [[150, 130, 110], [110, 130, 150], [130, 
 pub struct Trial {
     /// Number among the task's trials.
     pub index: u32,
-    /// Instances of each category; empty for Block Stacking.
+    /// Instances of each category; empty for Block Stacking. See [`Task::counts`](crate::task::Task::counts).
     pub counts: Vec<u16>,
     /// What the initial positions are drawn from.
     pub seed: Seed,
@@ -71,6 +73,7 @@ pub fn scene(family: Family, counts: &[u16]) -> Scene {
     match family {
         Family::BlockStacking => stacking_scene(),
         Family::ObjectSorting => sorting_scene(counts),
+        Family::TableCleanup => cleanup::scene(counts),
     }
 }
 
@@ -80,6 +83,7 @@ pub(crate) fn slot_name(family: Family, slot: SlotIndex) -> String {
     match family {
         Family::BlockStacking => format!("block_{}", BLOCK_LETTERS[index % 8]),
         Family::ObjectSorting => [CATEGORY_NAMES, CONTAINER_NAMES].concat()[index % 8].to_owned(),
+        Family::TableCleanup => cleanup::SLOT_NAMES[index % 6].to_owned(),
     }
 }
 
@@ -141,18 +145,16 @@ fn sorting_scene(counts: &[u16]) -> Scene {
 /// Random initial positions, without overlap, and the gripper open somewhere above.
 pub fn initial_state(family: Family, scene: &Scene, seed: Seed) -> SceneState {
     let mut rng = seed.derive("initial_state", &[]).rng();
-    let positions = match family {
-        Family::BlockStacking => stacking_positions(scene, &mut rng),
-        Family::ObjectSorting => sorting_positions(scene, &mut rng),
+    let all_upright =
+        |positions: Vec<Vec3>| -> Vec<Pose> { positions.into_iter().map(|position| upright(position, 0.0)).collect() };
+    let bodies_in_world = match family {
+        Family::BlockStacking => all_upright(stacking_positions(scene, &mut rng)),
+        Family::ObjectSorting => all_upright(sorting_positions(scene, &mut rng)),
+        Family::TableCleanup => cleanup::poses(scene, &mut rng),
     };
     let reach = scene.table_half_m.map(|half| 0.5 * half);
     let gripper = Vec3::new(rng.random_range(-reach[0]..reach[0]), rng.random_range(-reach[1]..reach[1]), 0.3);
-    SceneState {
-        gripper_in_world: upright(gripper, 0.0),
-        opening_m: 0.07,
-        held: None,
-        bodies_in_world: positions.into_iter().map(|position| upright(position, 0.0)).collect(),
-    }
+    SceneState { gripper_in_world: upright(gripper, 0.0), opening_m: 0.07, held: None, bodies_in_world }
 }
 
 fn stacking_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {

@@ -5,11 +5,11 @@
 //! A task depends on the seed and on its place in its split alone. So the first 20 of 1000 training tasks are the 20
 //! training tasks of a smaller experiment, and every experiment of one seed is measured on the same unseen tasks.
 
+mod cleanup;
 mod sorting;
 mod stacking;
 
 use crate::seed::Seed;
-use crate::task::check::condition_of;
 use crate::task::{Family, Goal, Split, Task, TaskSet};
 
 /// Fewer tasks can be drawn than asked for.
@@ -32,10 +32,7 @@ pub struct SampleError {
 ///
 /// When there are not as many.
 pub fn sample(family: Family, train: u32, unseen: u32, seed: Seed) -> Result<TaskSet, SampleError> {
-    let (train_limit, unseen_limit) = match family {
-        Family::BlockStacking => (stacking::split_limit(), stacking::split_limit()),
-        Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
-    };
+    let (train_limit, unseen_limit) = split_limits(family);
     for (split, asked, limit) in [(Split::Seen, train, train_limit), (Split::Unseen, unseen, unseen_limit)] {
         if asked > limit {
             return Err(SampleError { family, split, asked, limit });
@@ -44,12 +41,22 @@ pub fn sample(family: Family, train: u32, unseen: u32, seed: Seed) -> Result<Tas
     let tasks = match family {
         Family::BlockStacking => stacking::sample(train as usize, unseen as usize, seed),
         Family::ObjectSorting => sorting::sample(train as usize, unseen as usize, seed),
+        Family::TableCleanup => cleanup::sample(train as usize, unseen as usize, seed),
     };
     Ok(TaskSet { family, tasks })
 }
 
+/// How many training tasks and how many unseen ones a family has.
+pub fn split_limits(family: Family) -> (u32, u32) {
+    match family {
+        Family::BlockStacking => (stacking::split_limit(), stacking::split_limit()),
+        Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
+        Family::TableCleanup => (cleanup::N_TRAINING, cleanup::N_UNSEEN),
+    }
+}
+
 /// A task whose conditions are what its goals bring about.
 fn task(id: String, family: Family, goals: Vec<Goal>, split: Split) -> Task {
-    let conditions = goals.iter().map(|&goal| condition_of(family, goal)).collect();
+    let conditions = goals.iter().map(|&goal| goal.brings_about(family)).collect();
     Task { id, family, goals, conditions, split }
 }

@@ -88,7 +88,7 @@ pub enum TaskSetError {
         place: String,
         /// The slot's name.
         slot: String,
-        /// `category` or `container`.
+        /// What is allowed.
         expected: &'static str,
     },
     /// Something is to be brought to itself.
@@ -109,17 +109,17 @@ pub enum TaskSetError {
         /// The earlier goal.
         first: usize,
     },
-    /// Two blocks are put on one.
-    #[error("{place}: goals[{first}] already puts a block on {slot}")]
+    /// Two things are put on one.
+    #[error("{place}: goals[{first}] already puts something on {slot}")]
     TargetTaken {
         /// The later goal.
         place: String,
-        /// The block below.
+        /// What is below.
         slot: String,
         /// The earlier goal.
         first: usize,
     },
-    /// Blocks stand on each other in a ring.
+    /// Things stand on each other in a ring.
     #[error("tasks[{task}]: {} stand on each other in a ring", slots.join(", "))]
     Cycle {
         /// Which task.
@@ -127,12 +127,12 @@ pub enum TaskSetError {
         /// The ring, from the top down.
         slots: Vec<String>,
     },
-    /// A block is built on before it is in its place.
+    /// Something is built on before it is in its place.
     #[error("{place}: {slot} is built on, but goals[{later}] moves it afterwards; towers grow from below")]
     TargetMovedLater {
         /// The goal that builds on it.
         place: String,
-        /// The block below.
+        /// What is below.
         slot: String,
         /// The goal that moves it.
         later: usize,

@@ -33,11 +33,13 @@ pub enum Cause {
     EndedEarly,
     /// The actor did not end its root program within the allowed calls.
     NeverEnded,
+    /// The goal held at rest, but not after the tray was carried away.
+    FellWhenCarried,
 }
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::MissedGrasp,
         Self::KnockedTower,
         Self::ObjectOffTable,
@@ -46,6 +48,7 @@ impl Cause {
         Self::TimeLimit,
         Self::EndedEarly,
         Self::NeverEnded,
+        Self::FellWhenCarried,
     ];
 
     /// The name in files.
@@ -59,6 +62,7 @@ impl Cause {
             Self::TimeLimit => "time_limit",
             Self::EndedEarly => "ended_early",
             Self::NeverEnded => "never_ended",
+            Self::FellWhenCarried => "fell_when_carried",
         }
     }
 

@@ -86,11 +86,16 @@ fn put_beside(rows: &mut [f32], n_slots: usize, slot: usize, other: usize, offse
     }
 }
 
-/// Which slot each label shows: any order of blocks; categories and containers among themselves.
+/// Which slot each label shows: any order of blocks; categories and containers among themselves; bowls, which come before
+/// forks and tray.
 fn relabelling(family: Family, n_slots: usize, rng: &mut impl Rng) -> Vec<usize> {
     let mut slots: Vec<usize> = (0..n_slots).collect();
     match family {
         Family::BlockStacking => slots.shuffle(rng),
+        Family::TableCleanup => {
+            let n_bowls = usize::from(family.max_bowls().unwrap_or(0)).min(n_slots);
+            slots[..n_bowls].shuffle(rng);
+        }
         Family::ObjectSorting => slots.chunks_mut(n_slots.div_ceil(2).max(1)).for_each(|kind| kind.shuffle(rng)),
     }
     slots

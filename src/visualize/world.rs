@@ -2,10 +2,10 @@
 
 use rerun::components::FillMode;
 use rerun::external::re_log_types::EntityPath;
-use rerun::{AsComponents, Boxes3D, Cylinders3D, Ellipsoids3D, Quaternion, Transform3D, ViewCoordinates};
+use rerun::{AsComponents, Boxes3D, Cylinders3D, Ellipsoids3D, Mesh3D, Quaternion, Transform3D, ViewCoordinates};
 
-use crate::geometry::Pose;
-use crate::scene::{Body, BodyIndex, Mobility, Shape};
+use crate::geometry::{Pose, Vec3};
+use crate::scene::{Body, BodyIndex, Bowl, Mobility, Prism, Shape};
 use crate::trace::{Episode, ProgramCall};
 use crate::visualize::store::Store;
 use crate::visualize::{VisualizeError, clock, lanes, palette};
@@ -91,7 +91,23 @@ fn form(body: &Body, labelled: bool) -> Box<dyn AsComponents> {
                 .with_show_labels(labelled),
         ),
         Shape::OpenBox { inner_m, wall_m } => Box::new(open_box(inner_m, wall_m).with_colors(colors)),
+        Shape::Bowl(bowl) => Box::new(bowl_mesh(&bowl, body.color)),
     }
+}
+
+/// The bowl's prisms as one mesh. Corners are not shared between triangles, so that edges stay sharp.
+fn bowl_mesh(bowl: &Bowl, rgb: [u8; 3]) -> Mesh3D {
+    let of_prism = |prism: &Prism| {
+        let corners = prism.corners();
+        prism.triangles().into_iter().map(move |triangle| triangle.map(|corner| corners[corner as usize]))
+    };
+    let triangles: Vec<[[f32; 3]; 3]> = bowl.prisms().iter().flat_map(of_prism).collect();
+    let normal = |[a, b, c]: &[[f32; 3]; 3]| {
+        let [a, b, c] = [a, b, c].map(|corner| Vec3::from(*corner));
+        <[f32; 3]>::from((b - a).cross(&(c - a)).normalize())
+    };
+    let normals: Vec<[f32; 3]> = triangles.iter().flat_map(|triangle| [normal(triangle); 3]).collect();
+    Mesh3D::new(triangles.into_iter().flatten()).with_vertex_normals(normals).with_albedo_factor(*palette::color(rgb))
 }
 
 /// Floor and four walls; the origin is the middle of the floor's upper side.
@@ -143,7 +159,7 @@ fn target_box(episode: &Episode, call: &ProgramCall) -> Option<([f32; 3], [f32; 
     let shape = episode.scene.body(body).shape;
     let half = shape.half_extents_m().add_scalar(TARGET_MARGIN_M);
     let mut center = frame.state.body_in_world(body).translation.vector;
-    if let Shape::OpenBox { .. } = shape {
+    if shape.rim_m().is_some() {
         center.z += half.z;
     }
     Some((center.into(), half.into()))

@@ -71,7 +71,7 @@ fn stacking_tasks() -> TaskSet {
 }
 
 fn trial(task: &Task, index: u32, count: u16) -> Trial {
-    let counts = if task.family == Family::ObjectSorting { vec![count; 4] } else { Vec::new() };
+    let counts = task.counts(|| count);
     Trial { index, counts, seed: Seed(5).derive(&task.id, &[u64::from(index)]) }
 }
 

@@ -4,7 +4,7 @@ use ntp::program::Program;
 use ntp::task::Split;
 use ntp::trace::{Outcome, Span};
 
-use crate::kinematic::{demonstration, sorting, tower, trial};
+use crate::kinematic::{cleanup, demonstration, sorting, tower, trial};
 
 #[test]
 fn a_stacking_demonstration_has_four_frames_a_goal_and_one_more() {
@@ -43,4 +43,21 @@ fn sorting_visits_every_instance_of_every_category() {
     let n_drops = episode.calls.iter().filter(|call| call.program == Program::PickAndDrop).count();
     assert_eq!(n_drops, 12);
     assert_eq!(episode.frames.len(), 4 * 12 + 1);
+}
+
+#[test]
+fn cleaning_up_stacks_the_bowls_in_order_and_puts_every_fork_into_the_last() {
+    let task = cleanup("order", &[2, 0, 3], Split::Seen);
+    assert_eq!(
+        task.text(),
+        "put bowl_3 on tray, then put bowl_1 on bowl_3, then put bowl_4 on bowl_1, then put every fork into bowl_4"
+    );
+    let episode = demonstration(&task, &trial(&task, 0, 5), 0);
+    assert_eq!(episode.outcome, Outcome::Success);
+    let sub_tasks: Vec<Program> =
+        episode.calls.iter().filter(|call| call.depth == 1).map(|call| call.program).collect();
+    let expected = [vec![Program::PickAndPlace; 3], vec![Program::PickAndDrop; 5], vec![Program::None]].concat();
+    assert_eq!(sub_tasks, expected);
+    assert_eq!(episode.calls[0].program, Program::TableCleanup);
+    assert_eq!(episode.frames.len(), 4 * (3 + 5) + 1);
 }

@@ -2,7 +2,7 @@
 
 use ntp::geometry::{Vec3, horizontal_distance, upright};
 use ntp::robot::{Action, GRASP_M, HOVER_M, RobotApi};
-use ntp::scene::{BodyIndex, Mobility, Scene, SceneState, Shape, locked_bodies};
+use ntp::scene::{BodyIndex, Mobility, Scene, SceneState, locked_bodies};
 use ntp::seed::Seed;
 use ntp::task::{Condition, Family, Goal, Split, Task, Trial, initial_state, scene};
 use ntp::trace::{Actor, Cause, Episode, Frame, Provenance};
@@ -68,19 +68,17 @@ impl KinematicWorld {
 
     fn release(&mut self) {
         let Some(held) = self.state.held else { return };
-        let half_height = self.scene.body(held).shape.half_extents_m().z;
         let jitter = |rng: &mut ChaCha8Rng| rng.random_range(-0.003..0.003_f32);
         let xy = self.gripper() + Vec3::new(jitter(&mut self.rng), jitter(&mut self.rng), 0.0);
-        let container = self.scene.body_indices().find(|&body| {
-            let is_container = matches!(self.scene.body(body).shape, Shape::OpenBox { .. });
+        let containers = self.scene.body_indices().filter(|&body| {
+            let is_container = body != held && self.scene.body(body).shape.rim_m().is_some();
             is_container && horizontal_distance(&self.position(body), &xy) < 0.05
         });
-        let floor = match (container, self.below(0.03)) {
-            (Some(container), _) => self.position(container).z,
-            (None, Some(body)) => self.position(body).z + self.scene.body(body).shape.half_extents_m().z,
-            (None, None) => 0.0,
-        };
-        self.set_gripper(Vec3::new(xy.x, xy.y, floor + half_height + GRASP_M));
+        let container = containers.max_by(|&a, &b| self.position(a).z.total_cmp(&self.position(b).z));
+        let seat = |body: BodyIndex| self.position(body).z + self.scene.body(body).shape.seat_m();
+        let floor = container.or_else(|| self.below(0.03)).map_or(0.0, seat);
+        let foot = self.scene.body(held).shape.foot_m();
+        self.set_gripper(Vec3::new(xy.x, xy.y, floor + foot + GRASP_M));
         self.state.held = None;
         self.state.opening_m = 0.07;
     }
@@ -123,6 +121,10 @@ impl RobotApi for KinematicWorld {
     fn settle(&mut self) -> SceneState {
         self.state()
     }
+
+    fn carry(&mut self, _tray: BodyIndex) -> SceneState {
+        self.state()
+    }
 }
 
 /// A stacking task that builds one tower of the given blocks, lowest first.
@@ -145,12 +147,20 @@ pub(crate) fn sorting(id: &str, mapping: [u16; 4], split: Split) -> Task {
     Task { id: id.to_owned(), family: Family::ObjectSorting, goals, conditions, split }
 }
 
-/// A trial of a task: Block Stacking has no counts, Object Sorting the given number of each category.
+/// A clean-up task that stacks the given bowls, lowest first.
+pub(crate) fn cleanup(id: &str, bowls: &[u16], split: Split) -> Task {
+    use ntp::scene::SlotIndex;
+    let [fork, tray] = [SlotIndex(4), SlotIndex(5)];
+    let bowls = bowls.iter().copied().map(SlotIndex);
+    let below = std::iter::once(tray).chain(bowls.clone());
+    let goals: Vec<Goal> = bowls.chain([fork]).zip(below).map(|(source, target)| Goal { source, target }).collect();
+    let conditions = goals.iter().map(|goal| goal.brings_about(Family::TableCleanup)).collect();
+    Task { id: id.to_owned(), family: Family::TableCleanup, goals, conditions, split }
+}
+
+/// A trial of a task with the given number of each category.
 pub(crate) fn trial(task: &Task, index: u32, count: u16) -> Trial {
-    let counts = match task.family {
-        Family::BlockStacking => Vec::new(),
-        Family::ObjectSorting => vec![count; 4],
-    };
+    let counts = task.counts(|| count);
     Trial { index, counts, seed: Seed(7).derive(&task.id, &[u64::from(index)]) }
 }
 

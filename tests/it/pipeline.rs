@@ -258,6 +258,21 @@ fn a_wrong_pipeline_file_names_file_key_and_what_is_allowed_and_writes_nothing()
 }
 
 #[test]
+fn a_suite_that_asks_for_more_than_the_table_holds_is_refused_with_what_is_allowed() {
+    let cleanup = |text: &str, suite: &str| {
+        let text = text.replace("block_stacking", "table_cleanup");
+        text.replace("episodes = 4\n", &format!("episodes = 4\n{suite}\n"))
+    };
+    check_refused(|text| cleanup(text, "bowls = 5"), "rollout.suites[0].bowls", "allowed is 1 to 4");
+    let forks = "on_table = { min = 1, max = 21 }";
+    check_refused(|text| cleanup(text, forks), "rollout.suites[0].on_table", "<= 20");
+    check_refused(|text| cleanup(text, "").replace("train = 3", "train = 41"), "tasks.train", "at most 40");
+    check_refused(|text| cleanup(text, "").replace("unseen = 4", "unseen = 25"), "tasks.unseen", "at most 24");
+    let bowls = |text: &str| text.replace("episodes = 4\n", "episodes = 4\nbowls = 1\n");
+    check_refused(bowls, "rollout.suites[0].bowls", "block_stacking has no bowls");
+}
+
+#[test]
 fn a_pipeline_that_is_not_there_is_a_usage_error_with_its_path() {
     let error = Pipeline::load(Path::new("no/such.toml")).unwrap_err();
     assert!(matches!(error, PipelineError::Syntax { .. }));

@@ -1,12 +1,13 @@
 //! The interpreter, driven by the oracle.
 
 use ntp::model::Decisions;
+use ntp::robot::{Action, RobotApi};
 use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, run};
-use ntp::scene::SlotIndex;
+use ntp::scene::{BodyIndex, Scene, SceneState, SlotIndex};
 use ntp::task::{Split, Task};
-use ntp::trace::{Actor, Cause, Outcome, Provenance};
+use ntp::trace::{Actor, Cause, Frame, Outcome, Provenance};
 
-use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
+use crate::kinematic::{KinematicWorld, cleanup, demonstration, sorting, tower, trial};
 
 fn start(task: &Task, demonstrated: u16, on_table: u16) -> Start<'_> {
     let own_trial = trial(task, 1, on_table);
@@ -40,6 +41,52 @@ fn an_oracle_sorts_more_objects_than_were_demonstrated() {
     let map = sorting("m", [3, 0, 2, 2], Split::Unseen);
     let rollouts = check_oracle(vec![start(&map, 1, 4)]);
     assert_eq!(rollouts[0].decisions, 7 * 16 + 1);
+}
+
+#[test]
+fn an_oracle_cleans_up_more_forks_than_were_demonstrated() {
+    let task = cleanup("c", &[1, 3], Split::Unseen);
+    let rollouts = check_oracle(vec![start(&task, 1, 20)]);
+    assert_eq!(rollouts[0].decisions, 7 * (2 + 20) + 1);
+}
+
+/// The world of a trial, but the last body falls off the tray when it is carried.
+struct Shaky(KinematicWorld);
+
+impl RobotApi for Shaky {
+    fn scene(&self) -> &Scene {
+        self.0.scene()
+    }
+    fn state(&self) -> SceneState {
+        self.0.state()
+    }
+    fn frames(&self) -> &[Frame] {
+        self.0.frames()
+    }
+    fn act(&mut self, action: Action) -> Result<(), Cause> {
+        self.0.act(action)
+    }
+    fn settle(&mut self) -> SceneState {
+        self.0.settle()
+    }
+    fn carry(&mut self, tray: BodyIndex) -> SceneState {
+        let mut carried = self.0.carry(tray);
+        let fork = self.scene().slot(SlotIndex(4)).bodies[0];
+        carried.bodies_in_world[usize::from(fork.0)].translation.vector.x += 0.3;
+        carried
+    }
+}
+
+#[test]
+fn what_falls_when_carried_is_the_cause_of_failure() {
+    let task = cleanup("c", &[1, 3], Split::Unseen);
+    let own_trial = trial(&task, 1, 2);
+    let world = Box::new(Shaky(KinematicWorld::new(task.family, &own_trial)));
+    let starts = vec![Start { world, ..start(&task, 2, 2) }];
+    let mut oracle = Oracle::for_starts(&starts);
+    let rollouts = run(&mut oracle, starts, Limits::default()).unwrap();
+    assert_eq!(rollouts[0].episode.outcome, Outcome::Failure(Cause::FellWhenCarried));
+    assert_eq!(rollouts[0].first_divergence, None);
 }
 
 /// Calls the wrong thing at one decision.

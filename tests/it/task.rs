@@ -108,12 +108,56 @@ fn sorting_trains_on_four_mappings_that_cover_every_pair() {
 }
 
 #[test]
+fn cleaning_up_has_unseen_orders_of_every_length() {
+    let set = sample(Family::TableCleanup, 40, 24, Seed(9)).unwrap();
+    set.validate().unwrap();
+    let lengths = |split| count(set.of_split(split).map(Task::n_bowls));
+    assert_eq!(lengths(Split::Seen), BTreeMap::from([(1, 2), (2, 8), (3, 16), (4, 14)]));
+    assert_eq!(lengths(Split::Unseen), BTreeMap::from([(1, 2), (2, 4), (3, 8), (4, 10)]));
+    let distinct: BTreeSet<_> = set.tasks.iter().map(Task::canonical_goal).collect();
+    assert_eq!(distinct.len(), 64);
+    let fewer = sample(Family::TableCleanup, 20, 10, Seed(9)).unwrap();
+    assert_eq!(goals_of(&fewer, Split::Seen), goals_of(&set, Split::Seen)[..20]);
+    assert_eq!(goals_of(&fewer, Split::Unseen), goals_of(&set, Split::Unseen)[..10]);
+    assert_ne!(sample(Family::TableCleanup, 40, 24, Seed(10)).unwrap().tasks, set.tasks);
+}
+
+#[test]
+fn a_bowl_that_is_not_asked_for_stands_aside_and_the_others_have_room_for_fingers() {
+    use ntp::geometry::horizontal_distance;
+    use ntp::scene::Mobility;
+    let scene = ntp::task::scene(Family::TableCleanup, &[1, 0, 1, 1, 20]);
+    assert_eq!(scene.slots.len(), Family::TableCleanup.n_slots());
+    assert_eq!(scene.slots[4].bodies.len(), 20);
+    for seed in 0..2000 {
+        let state = ntp::task::initial_state(Family::TableCleanup, &scene, Seed(seed));
+        let at: Vec<_> = state.bodies_in_world.iter().map(|pose| pose.translation.vector).collect();
+        for second in 0..at.len() {
+            for first in 0..second {
+                let least = match (first < 4, second < 4) {
+                    (true, true) => 0.18,
+                    (true, false) => 0.125,
+                    _ => 0.085,
+                };
+                let apart = horizontal_distance(&at[first], &at[second]);
+                assert!(apart >= least, "seed {seed}: bodies {first} and {second} are {apart} m apart");
+            }
+            let aside = second == 1;
+            assert_eq!(at[second].x > 0.7, aside, "seed {seed}: body {second}");
+            assert_eq!(scene.bodies[second].mobility == Mobility::Fixed, aside || second == at.len() - 1);
+        }
+    }
+}
+
+#[test]
 fn more_tasks_than_there_are_is_an_error() {
     let check = |family, train, unseen, expected: &str| {
         let error = sample(family, train, unseen, Seed(1)).unwrap_err();
         assert_eq!(error.to_string(), expected);
     };
     check(Family::ObjectSorting, 5, 0, "object_sorting has at most 4 seen tasks to draw, 5 were asked for");
+    check(Family::TableCleanup, 41, 0, "table_cleanup has at most 40 seen tasks to draw, 41 were asked for");
+    check(Family::TableCleanup, 40, 25, "table_cleanup has at most 24 unseen tasks to draw, 25 were asked for");
     check(Family::ObjectSorting, 4, 253, "object_sorting has at most 252 unseen tasks to draw, 253 were asked for");
     check(
         Family::BlockStacking,
@@ -126,8 +170,8 @@ fn more_tasks_than_there_are_is_an_error() {
 #[test]
 fn a_task_file_reads_back_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
-    for (family, train) in [(Family::BlockStacking, 30), (Family::ObjectSorting, 4)] {
-        let set = sample(family, train, 40, Seed(2)).unwrap();
+    for (family, train) in [(Family::BlockStacking, 30), (Family::ObjectSorting, 4), (Family::TableCleanup, 40)] {
+        let set = sample(family, train, 24, Seed(2)).unwrap();
         let path = folder.path().join(family.name()).join("tasks.json");
         set.write(&path).unwrap();
         assert_eq!(TaskSet::read(&path).unwrap(), set);
@@ -197,7 +241,7 @@ fn a_task_file_that_breaks_a_rule_is_refused_by_name_and_place() {
     );
     check_read(
         goals(json!([{"source": "block_B", "target": "block_A"}, {"source": "block_C", "target": "block_A"}])),
-        "tasks[0].goals[1]: goals[0] already puts a block on block_A",
+        "tasks[0].goals[1]: goals[0] already puts something on block_A",
     );
     check_read(
         goals(json!([{"source": "block_C", "target": "block_B"}, {"source": "block_B", "target": "block_A"}])),
@@ -241,6 +285,14 @@ fn a_set_made_in_memory_keeps_the_same_rules() {
     check(Family::ObjectSorting, vec![on(5, 6)], "tasks[0].goals[0].source: bin_2 is not a category");
     check(Family::ObjectSorting, vec![on(0, 4), on(0, 5)], "tasks[0].goals[1]: cube is already moved by goals[0]");
     check(Family::ObjectSorting, vec![on(0, 4)], "tasks[0].conditions[0]: no goal brings this about");
+    check(Family::TableCleanup, vec![on(0, 6)], "tasks[0].goals[0].target: slot 6 does not exist, the scene has 6");
+    check(Family::TableCleanup, vec![on(5, 0)], "tasks[0].goals[0].source: tray is not a bowl or fork");
+    check(Family::TableCleanup, vec![on(0, 4)], "tasks[0].goals[0].target: fork is not a bowl or tray");
+    check(
+        Family::TableCleanup,
+        vec![on(0, 5), on(1, 0), on(4, 0)],
+        "tasks[0].goals[2]: goals[1] already puts something on bowl_1",
+    );
     let mut set = sample(Family::BlockStacking, 1, 0, Seed(1)).unwrap();
     set.family = Family::ObjectSorting;
     let error = set.validate().unwrap_err().to_string();

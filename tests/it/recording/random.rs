@@ -2,7 +2,7 @@
 
 use ntp::geometry::{Pose, Rotation, Vec3};
 use ntp::program::Program;
-use ntp::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape, Slot, SlotIndex};
+use ntp::scene::{Body, BodyIndex, Bowl, Mobility, Scene, SceneState, Shape, Slot, SlotIndex};
 use ntp::task::{Family, Split};
 use ntp::trace::{
     Actor, CallId, Cause, Episode, EpisodeParts, Frame, Outcome, Prediction, ProgramCall, Provenance, Span,
@@ -49,10 +49,18 @@ pub(super) fn episode(family: Family, seed: u64, n_bodies: usize, n_frames: u32)
 fn scene(rng: &mut ChaCha8Rng, n_bodies: usize) -> Scene {
     let body = |rng: &mut ChaCha8Rng, position: usize| Body {
         name: format!("body {position}"),
-        shape: match rng.random_range(0..4) {
+        shape: match rng.random_range(0..5) {
             0 => Shape::Cuboid { half_extents_m: [0.1, 0.25, 0.3] },
             1 => Shape::Cylinder { radius_m: 0.02, half_height_m: rng.random() },
             2 => Shape::Ball { radius_m: rng.random() },
+            3 => Shape::Bowl(Bowl {
+                floor_radius_m: rng.random(),
+                rim_radius_m: 0.07,
+                height_m: 0.05,
+                wall_m: 0.004,
+                foot_radius_m: 0.03,
+                foot_height_m: rng.random(),
+            }),
             _ => Shape::OpenBox { inner_m: [0.1, 0.2, rng.random()], wall_m: 0.005 },
         },
         mobility: if rng.random() { Mobility::Movable } else { Mobility::Fixed },
@@ -168,7 +176,7 @@ impl<'a> Tree<'a> {
     }
 
     fn program(&mut self, depth: u8, is_last: bool) -> Program {
-        match self.rng.random_range(0..4) {
+        match self.rng.random_range(0..5) {
             0 if is_last => Program::None,
             1 | 2 if depth < 4 => *[Program::Pick, Program::PickAndDrop, Program::Place].choose(self.rng).unwrap(),
             _ => *[Program::MoveTo, Program::Grip, Program::Release].choose(self.rng).unwrap(),

@@ -40,7 +40,7 @@ fn bits(frames: &[Frame]) -> Vec<u32> {
 #[test]
 fn each_action_ends_with_one_boundary_frame_whatever_it_is() {
     for seed in 0..12 {
-        let family = Family::ALL[seed as usize % 2];
+        let family = Family::ALL[seed as usize % Family::ALL.len()];
         let mut world = world(family, &[3; 4], Seed(seed), &SimulationConfig::default());
         assert_eq!(world.frames().len(), 1);
         assert!(world.now().boundary && world.now().time_nanos == 0);

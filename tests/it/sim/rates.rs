@@ -58,6 +58,21 @@ fn an_expert_sorts_forty_objects_nearly_always() {
 }
 
 #[test]
+fn an_expert_cleans_up_any_number_of_bowls_and_forks_and_nothing_falls_when_carried() {
+    for n_bowls in 1..=4 {
+        for n_forks in [1, 5, 10, 20] {
+            check_rate(3, 100, |seed| {
+                let mut bowls: Vec<u16> = (0..4).collect();
+                bowls.shuffle(&mut seed.derive("bowls", &[n_bowls, n_forks]).rng());
+                let id = format!("{n_bowls} bowls, {n_forks} forks");
+                let task = crate::kinematic::cleanup(&id, &bowls[..n_bowls as usize], Split::Seen);
+                demonstration(&task, task.counts(|| n_forks as u16), seed.derive(&id, &[]))
+            });
+        }
+    }
+}
+
+#[test]
 fn one_container_holds_forty_objects() {
     for seed in 0..3 {
         let container = (seed % 4) as u16;
