@@ -47,7 +47,7 @@ pub struct AdversaryConfig {
 
 impl Default for AdversaryConfig {
     fn default() -> Self {
-        Self { probability: 0.25, impulse_ns: 0.08 }
+        Self { probability: 0.25, impulse_ns: 0.06 }
     }
 }
 
