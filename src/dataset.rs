@@ -48,7 +48,7 @@ mod validate;
 mod writer;
 
 pub use config::{ConvertConfig, FailedEpisodes, FrameChoice};
-pub use convert::{RecordingEpisodes, convert};
+pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use read::read_trials;

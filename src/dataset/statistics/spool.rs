@@ -1,30 +1,34 @@
-//! Keys on disk until quantiles are selected: memory does not grow with how many there are.
+//! Keys until quantiles are selected: in memory while they are few, else on disk, so that memory does not grow with how
+//! many there are.
 //!
 //! The file has no name: the system removes it with the process, however that ends.
 
-use std::fs::File;
 use std::io::{BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+
+use tempfile::SpooledTempFile;
 
 use crate::artifact::IoError;
 use crate::dataset::statistics::number::{n_bytes, read_keys};
 use crate::dataset::statistics::quantile::Selector;
 
-const BUFFER_BYTES: usize = 1 << 18;
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// Keys that are kept in memory; more go to a file.
+const MEMORY_BYTES: usize = 1 << 26;
 
 /// The keys of some rows at a time, column by column.
 pub(super) struct Spool {
     folder: PathBuf,
-    file: BufWriter<File>,
+    file: BufWriter<SpooledTempFile>,
     n_blocks: u64,
 }
 
 impl Spool {
     /// A spool in a folder, which must have room for all keys.
-    pub(super) fn create(folder: &Path) -> Result<Self, IoError> {
-        let file = tempfile::tempfile_in(folder).map_err(IoError::system("create a temporary file in", folder))?;
-        let file = BufWriter::with_capacity(BUFFER_BYTES, file);
-        Ok(Self { folder: folder.to_owned(), file, n_blocks: 0 })
+    pub(super) fn new(folder: &Path) -> Self {
+        let file = BufWriter::with_capacity(BUFFER_BYTES, tempfile::spooled_tempfile_in(MEMORY_BYTES, folder));
+        Self { folder: folder.to_owned(), file, n_blocks: 0 }
     }
 
     /// Begins a block of `n_rows` rows.
@@ -52,7 +56,7 @@ impl Spool {
     }
 }
 
-fn pass(reader: &mut BufReader<File>, n_blocks: u64, columns: &mut [Vec<Selector>]) -> std::io::Result<()> {
+fn pass(reader: &mut BufReader<SpooledTempFile>, n_blocks: u64, columns: &mut [Vec<Selector>]) -> std::io::Result<()> {
     let (mut bytes, mut keys) = (Vec::new(), Vec::new());
     reader.seek(SeekFrom::Start(0))?;
     for _ in 0..n_blocks {
