@@ -13,18 +13,24 @@ pub enum DivergenceKind {
     Argument,
     /// The same on another part of the demonstration.
     Scope,
-    /// The same, but the caller ended early or late.
-    End,
+    /// The caller ended before it should.
+    EarlyEnd,
+    /// The caller did not end when it should.
+    LateEnd,
 }
 
 impl DivergenceKind {
+    /// Every kind.
+    pub const ALL: [Self; 5] = [Self::Program, Self::Argument, Self::Scope, Self::EarlyEnd, Self::LateEnd];
+
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Program => "program",
             Self::Argument => "argument",
             Self::Scope => "scope",
-            Self::End => "end",
+            Self::EarlyEnd => "early_end",
+            Self::LateEnd => "late_end",
         }
     }
 }
@@ -74,7 +80,7 @@ pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall])
     let differing = decided.enumerate().find_map(|(decision, call)| {
         let kind = match expected.get(decision) {
             Some(wanted) => difference(call, wanted),
-            None => Some(DivergenceKind::End),
+            None => Some(DivergenceKind::LateEnd),
         };
         kind.map(|kind| (decision, call, kind))
     });
@@ -85,13 +91,17 @@ pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall])
 
 fn difference(call: &ProgramCall, wanted: &ProgramCall) -> Option<DivergenceKind> {
     if call.program != wanted.program {
-        Some(DivergenceKind::Program)
+        Some(match (call.program, wanted.program) {
+            (Program::None, _) => DivergenceKind::EarlyEnd,
+            (_, Program::None) => DivergenceKind::LateEnd,
+            _ => DivergenceKind::Program,
+        })
     } else if call.argument != wanted.argument {
         Some(DivergenceKind::Argument)
     } else if call.program.is_composite() && call.output != wanted.output {
         Some(DivergenceKind::Scope)
     } else if call.end_of_program != wanted.end_of_program {
-        Some(DivergenceKind::End)
+        Some(if call.end_of_program { DivergenceKind::EarlyEnd } else { DivergenceKind::LateEnd })
     } else {
         None
     }

@@ -82,7 +82,8 @@ fn a_wrong_argument_is_the_first_divergence_and_fails_the_goal() {
 #[test]
 fn an_early_end_of_the_root_is_a_failure_although_nothing_went_wrong_before() {
     let rollout = check_spoiled(7, |query, decision| *decision = Decision::end(query));
-    assert_eq!(rollout.first_divergence.unwrap().kind.name(), "program");
+    assert_eq!(rollout.first_divergence.unwrap().kind.name(), "early_end");
+    assert_eq!(rollout.fault_decision, None);
     assert_eq!(rollout.episode.outcome, Outcome::Failure(Cause::EndedEarly));
 }
 
