@@ -17,6 +17,8 @@ mod model;
 #[cfg(test)]
 mod pipeline;
 #[cfg(test)]
+mod query;
+#[cfg(test)]
 mod recording;
 #[cfg(test)]
 mod report;
