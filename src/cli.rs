@@ -44,6 +44,8 @@ pub enum Command {
     Validate(PathArgs),
     /// Show an episode of a recording in Rerun, or simulate it again.
     Replay(ReplayArgs),
+    /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
+    Query(QueryArgs),
     /// Print a completion script.
     Completions {
         /// For which shell.
@@ -147,4 +149,23 @@ pub struct ReplayArgs {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `ntp query`.
+#[derive(Debug, Args)]
+pub struct QueryArgs {
+    /// A dataset, a run directory, rollouts or a model.
+    pub path: PathBuf,
+    /// The statement; without one, the tables and their columns are listed.
+    #[arg(value_name = "SELECT …")]
+    pub sql: Option<String>,
+    /// Print the rows as comma-separated values.
+    #[arg(long, requires = "sql", conflicts_with_all = ["json", "parquet"])]
+    pub csv: bool,
+    /// Print the rows as JSON.
+    #[arg(long, conflicts_with = "parquet")]
+    pub json: bool,
+    /// Write the rows to a Parquet file.
+    #[arg(long, value_name = "FILE", requires = "sql")]
+    pub parquet: Option<PathBuf>,
 }

@@ -5,6 +5,7 @@ mod completions;
 mod inspect;
 mod kind;
 mod output;
+mod query;
 mod replay;
 mod stages;
 mod tasks;
@@ -79,6 +80,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Query(args) => query::run(args),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -46,5 +46,5 @@ mod writer;
 
 pub use error::{Damage, EpisodeProblem, MessageProblem, RecordingError};
 pub use inspect::{RecordingInspection, TopicInspection, inspect};
-pub use reader::ShardReader;
+pub use reader::{BoundaryReader, ShardReader};
 pub use writer::{ShardSummary, ShardWriter};

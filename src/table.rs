@@ -26,6 +26,7 @@ mod write;
 
 pub use column::{Column, Columns};
 pub use error::TableError;
+pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
 pub use read::{TableReader, read};
 pub use schema::TableSchema;

@@ -7,6 +7,7 @@
 //! [`Episode`] can only be made by [`Episode::new`], which holds every rule of the program tree; see [`TraceError`].
 //! No file access and no physics here.
 
+mod boundaries;
 mod call;
 mod episode;
 mod frame;
@@ -16,6 +17,7 @@ mod recorder;
 mod rules;
 mod span;
 
+pub use boundaries::{Boundaries, RecordedFrames};
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
 pub use frame::{Frame, Observation};

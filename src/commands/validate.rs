@@ -46,7 +46,11 @@ pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
     } else {
         output::print(&to_text(&validation))?;
     }
-    Ok(if validation.findings.is_empty() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+    Ok(match (validation.findings.is_empty(), validation.warnings.is_empty()) {
+        (false, _) => CommandOutcome::CheckFailed,
+        (true, false) => CommandOutcome::LeftOut,
+        (true, true) => CommandOutcome::Done,
+    })
 }
 
 /// Checks what lies in a run directory.

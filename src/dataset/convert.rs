@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
 use crate::dataset::writer::{ConvertSummary, DatasetWriter};
-use crate::trace::Episode;
+use crate::trace::{Boundaries, Episode};
 
 /// One recording: its name and hash, and its episodes in order.
 #[derive(Clone, Debug)]
@@ -18,6 +18,28 @@ pub struct RecordingEpisodes<I> {
     pub episodes: I,
 }
 
+/// What can be a part of a dataset: an [`Episode`], or the [`Boundaries`] of one.
+pub trait RecordedEpisode {
+    /// Adds it to a dataset, as [`DatasetWriter::append`] does.
+    ///
+    /// # Errors
+    ///
+    /// What the writer says.
+    fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError>;
+}
+
+impl RecordedEpisode for Episode {
+    fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        writer.append(self, file, sha256)
+    }
+}
+
+impl RecordedEpisode for Boundaries {
+    fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        writer.append_boundaries(self, file, sha256)
+    }
+}
+
 /// Writes recordings as a dataset into an empty directory.
 ///
 /// Episodes are numbered as they come. Memory holds one episode, some thousand rows of each table, and the distinct
@@ -27,17 +49,22 @@ pub struct RecordingEpisodes<I> {
 ///
 /// The first error of a recording, or what [`DatasetWriter`] says. What was written so far is then left in the
 /// directory, without `meta/info.json`.
-pub fn convert<R, I, E>(recordings: R, config: &ConvertConfig, directory: &Path) -> Result<ConvertSummary, ConvertError>
+pub fn convert<R, I, T, E>(
+    recordings: R,
+    config: &ConvertConfig,
+    directory: &Path,
+) -> Result<ConvertSummary, ConvertError>
 where
     R: IntoIterator<Item = Result<RecordingEpisodes<I>, E>>,
-    I: IntoIterator<Item = Result<Episode, E>>,
+    I: IntoIterator<Item = Result<T, E>>,
+    T: RecordedEpisode,
     E: std::error::Error + Send + Sync + 'static,
 {
     let mut writer = DatasetWriter::create(directory, config)?;
     for recording in recordings {
         let RecordingEpisodes { file, sha256, episodes } = recording.map_err(from_recording)?;
         for episode in episodes {
-            writer.append(&episode.map_err(from_recording)?, &file, &sha256)?;
+            episode.map_err(from_recording)?.append_to(&mut writer, &file, &sha256)?;
         }
     }
     writer.finish()

@@ -3,7 +3,7 @@
 use crate::dataset::ConvertError;
 use crate::dataset::config::FrameChoice;
 use crate::dataset::frame_map::FrameMap;
-use crate::trace::{Actor, Episode, Frame, Span};
+use crate::trace::{Actor, Boundaries, Episode, Frame, Span};
 
 /// The spans of one call, counted in rows.
 ///
@@ -20,8 +20,15 @@ pub(crate) struct CallSpans {
 #[derive(Clone, Copy)]
 pub(crate) struct EpisodeView<'e> {
     pub(crate) episode: &'e Episode,
-    pub(crate) map: &'e FrameMap,
     pub(crate) spans: &'e [CallSpans],
+    /// How many frames were recorded.
+    pub(crate) n_recorded: u32,
+    /// Time of the last one recorded.
+    pub(crate) end_nanos: u64,
+    /// The position in the recording of each row's frame.
+    recorded: &'e [u32],
+    /// Whether the episode has the frames of rows alone.
+    is_excerpt: bool,
 }
 
 /// What is used again for each episode.
@@ -40,6 +47,7 @@ impl ViewBuffers {
     ) -> Result<EpisodeView<'e>, ConvertError> {
         self.map.refill(episode.frames.iter().map(|frame| frame.boundary || choice == FrameChoice::All));
         self.spans.clear();
+        let end_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
         let is_own = is_own_specification(episode);
         for call in &episode.calls {
             let row_span = |span: Span| {
@@ -58,7 +66,24 @@ impl ViewBuffers {
             };
             self.spans.push(CallSpans { input, output, frames });
         }
-        Ok(EpisodeView { episode, map: &self.map, spans: &self.spans })
+        let (recorded, n_recorded) = (self.map.recorded(), episode.frames.len() as u32);
+        Ok(EpisodeView { episode, spans: &self.spans, n_recorded, end_nanos, recorded, is_excerpt: false })
+    }
+
+    /// Maps an episode of which only the boundary frames were read: these are the rows.
+    pub(crate) fn view_boundaries<'e>(&'e mut self, boundaries: &'e Boundaries) -> EpisodeView<'e> {
+        let (episode, recorded) = (boundaries.episode(), boundaries.recorded());
+        self.spans.clear();
+        let spans = episode.calls.iter();
+        self.spans.extend(spans.map(|call| CallSpans { input: call.input, output: call.output, frames: call.frames }));
+        EpisodeView {
+            episode,
+            spans: &self.spans,
+            n_recorded: recorded.count,
+            end_nanos: recorded.end_nanos,
+            recorded: &recorded.positions,
+            is_excerpt: true,
+        }
     }
 }
 
@@ -70,12 +95,17 @@ pub(crate) fn is_own_specification(episode: &Episode) -> bool {
 impl<'e> EpisodeView<'e> {
     /// How many rows it has.
     pub(crate) fn n_rows(&self) -> usize {
-        self.map.n_rows()
+        self.recorded.len()
     }
 
     /// The frames that are rows, with their positions in the recording.
     pub(crate) fn frames(self) -> impl Iterator<Item = (u32, &'e Frame)> {
-        self.map.recorded().iter().map(move |&frame| (frame, &self.episode.frames[frame as usize]))
+        let frames = &self.episode.frames;
+        let frame = move |(row, &recorded): (usize, &u32)| {
+            let frame = if self.is_excerpt { row } else { recorded as usize };
+            (recorded, &frames[frame])
+        };
+        self.recorded.iter().enumerate().map(frame)
     }
 
     /// Frames of the specification that the spans `input` and `output` count.

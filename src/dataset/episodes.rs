@@ -105,8 +105,8 @@ impl ProvenanceRows {
         self.recording_sha256.push(source.sha256.to_owned());
         self.recording_index.push(provenance.index as i64);
         self.n_frames.push(view.n_rows() as i64);
-        self.n_recorded_frames.push(episode.frames.len() as i64);
-        self.sim_secs.push(episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 / 1e9));
+        self.n_recorded_frames.push(i64::from(view.n_recorded));
+        self.sim_secs.push(view.end_nanos as f64 / 1e9);
         let specification = if is_own_specification(episode) { "episode" } else { "demonstration" };
         self.specification.push(specification.to_owned());
         self.specification_frames.push(view.specification_frames());

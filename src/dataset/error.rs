@@ -39,6 +39,12 @@ pub enum ConvertError {
         /// Slots of the episode.
         found: usize,
     },
+    /// Rows are to be made of frames that were not read.
+    #[error("episode {episode}: all frames are to be rows, but only its boundary frames were read")]
+    FramesMissing {
+        /// The episode's number in its recordings.
+        episode: u64,
+    },
     /// A program saw a frame that is no boundary.
     #[error("episode {episode}, call {call}: frames {begin}..{end} do not begin and end at boundary frames")]
     SpanOffBoundary {

@@ -39,11 +39,6 @@ impl FrameMap {
         &self.recorded
     }
 
-    /// How many rows.
-    pub(crate) fn n_rows(&self) -> usize {
-        self.recorded.len()
-    }
-
     /// A span of recorded frames counted in rows; `None` when its first or last frame is no row.
     pub(crate) fn span(&self, recorded: Span) -> Option<Span> {
         let row = |frame: u32| self.rows.get(frame as usize).copied().filter(|&row| row != NO_ROW);
@@ -64,7 +59,7 @@ mod tests {
             ends in (0_usize..60, 0_usize..60),
         ) {
             let map = FrameMap::new(kept.iter().copied());
-            let n_rows = map.n_rows();
+            let n_rows = map.recorded().len();
             let (first, last) = (ends.0 % n_rows, ends.1 % n_rows);
             let (first, last) = (first.min(last), first.max(last));
             let recorded = Span { begin: map.recorded()[first], end: map.recorded()[last] + 1 };

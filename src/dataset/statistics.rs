@@ -1,7 +1,7 @@
 //! Statistics of the numeric features: of each episode while it is written, and of the whole dataset, exactly.
 //!
-//! Mean and deviation of the whole are merged from the episodes'. Quantiles cannot be merged: all numbers are kept in a
-//! temporary file and selected from it, see [`quantile`]. `LeRobot` samples and takes an envelope instead.
+//! Mean and deviation of the whole are merged from the episodes'. Quantiles cannot be merged: all numbers are kept, in a
+//! temporary file where they are many, and selected from there, see [`quantile`]. `LeRobot` samples and takes an envelope instead.
 //!
 //! Deviation is that of the population, quantiles are interpolated linearly between the two nearest values. Episodes
 //! have no quantiles of their own: `LeRobot`'s readers do without, and of some twenty values they would say little.
@@ -23,7 +23,7 @@ use number::{copy_keys, copy_values, key_of};
 use quantile::Selector;
 use spool::Spool;
 
-/// Rows of a block of the temporary file: few enough to stay in a processor's cache.
+/// Rows of a block of keys: few enough to stay in a processor's cache.
 const BLOCK_ROWS: usize = 256;
 
 /// The quantiles of [`FeatureStatistics`].
@@ -127,11 +127,11 @@ pub(crate) struct Statistics {
 }
 
 impl Statistics {
-    /// Begins; numbers are kept in a temporary file in `folder`.
-    pub(crate) fn new(folder: &Path, n_slots: usize) -> Result<Self, IoError> {
+    /// Begins; numbers that are too many for memory are kept in a temporary file in `folder`.
+    pub(crate) fn new(folder: &Path, n_slots: usize) -> Self {
         let numeric = FEATURES.iter().filter(|feature| feature.is_numeric());
         let features = numeric.map(|feature| Gathered::new(feature, feature.width(n_slots))).collect();
-        Ok(Self { features, spool: Spool::create(folder)?, values: Vec::new(), bytes: Vec::new() })
+        Self { features, spool: Spool::new(folder), values: Vec::new(), bytes: Vec::new() }
     }
 
     /// Adds an episode: some rows of the features' columns.

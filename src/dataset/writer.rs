@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::artifact::{IoError, create_dir, write_json};
 use crate::dataset::ConvertError;
 use crate::dataset::calls::{CallRows, ScopeRows};
-use crate::dataset::config::{ConvertConfig, FailedEpisodes};
+use crate::dataset::config::{ConvertConfig, FailedEpisodes, FrameChoice};
 use crate::dataset::episode_view::{EpisodeView, ViewBuffers};
 use crate::dataset::episodes::{EpisodePlaces, MetaRows, ProvenanceRows, Source};
 use crate::dataset::frames::{EpisodeIds, FrameRows};
@@ -21,12 +21,12 @@ use crate::dataset::text::TextTable;
 use crate::program::{Program, vocabulary_hash};
 use crate::table::{TableSchema, TableWriter, Values, WriteOptions};
 use crate::task::Family;
-use crate::trace::Episode;
+use crate::trace::{Boundaries, Episode};
 
 /// Rows of frames and of calls that make a row group, at least. A row group holds whole episodes.
 const GROUP_ROWS: usize = 1 << 13;
 /// The same for scoping labels, which are many and small.
-const SCOPE_GROUP_ROWS: usize = 1 << 17;
+const SCOPE_GROUP_ROWS: usize = 1 << 15;
 /// The same for episodes.
 const EPISODE_GROUP_ROWS: usize = 1 << 12;
 const MEGABYTE: usize = 1 << 20;
@@ -108,18 +108,35 @@ impl DatasetWriter {
     /// When it has another number of slots than those before, its spans are off its boundaries, or nothing can be
     /// written.
     pub fn append(&mut self, episode: &Episode, file: &str, sha256: &str) -> Result<(), ConvertError> {
-        if !episode.outcome.is_success() && self.config.failed == FailedEpisodes::LeaveOut {
-            self.failed_left_out += 1;
+        if !self.is_wanted(episode) {
             return Ok(());
         }
-        let mut tables = match self.tables.take() {
-            Some(tables) => tables,
-            None => Tables::create(&self.root, &self.config, episode)?,
-        };
         let view = self.buffers.view(episode, self.config.frames)?;
-        tables.append(&view, Source { file, sha256 }, self.config.fps.get())?;
-        self.tables = Some(tables);
-        Ok(())
+        append(&mut self.tables, &self.root, &self.config, &view, Source { file, sha256 })
+    }
+
+    /// Adds an episode of which only the boundary frames were read.
+    ///
+    /// # Errors
+    ///
+    /// As [`DatasetWriter::append`]; when there are frames between the boundaries, and they should be rows.
+    pub fn append_boundaries(&mut self, boundaries: &Boundaries, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        let (episode, recorded) = (boundaries.episode(), boundaries.recorded());
+        if self.config.frames == FrameChoice::All && recorded.positions.len() != recorded.count as usize {
+            return Err(ConvertError::FramesMissing { episode: episode.provenance.index });
+        }
+        if !self.is_wanted(episode) {
+            return Ok(());
+        }
+        let view = self.buffers.view_boundaries(boundaries);
+        append(&mut self.tables, &self.root, &self.config, &view, Source { file, sha256 })
+    }
+
+    /// Whether an episode is to be written; one that is not is counted.
+    fn is_wanted(&mut self, episode: &Episode) -> bool {
+        let is_left_out = !episode.outcome.is_success() && self.config.failed == FailedEpisodes::LeaveOut;
+        self.failed_left_out += u64::from(is_left_out);
+        !is_left_out
     }
 
     /// Ends the dataset: what is buffered, the statistics and the JSON files.
@@ -132,6 +149,23 @@ impl DatasetWriter {
         let tables = tables.ok_or(ConvertError::NoEpisodes { failed: failed_left_out })?;
         tables.finish(&root, &config, failed_left_out)
     }
+}
+
+/// Adds an episode to the tables, which the first one begins. After an error there are none.
+fn append(
+    tables: &mut Option<Tables>,
+    root: &Path,
+    config: &ConvertConfig,
+    view: &EpisodeView<'_>,
+    source: Source<'_>,
+) -> Result<(), ConvertError> {
+    let mut begun = match tables.take() {
+        Some(begun) => begun,
+        None => Tables::create(root, config, view.episode)?,
+    };
+    begun.append(view, source, config.fps.get())?;
+    *tables = Some(begun);
+    Ok(())
 }
 
 impl Tables {
@@ -149,7 +183,7 @@ impl Tables {
             scopes: ScopeRows::default(),
             provenance: ProvenanceRows::default(),
             meta: MetaRows::default(),
-            statistics: Statistics::new(root, n_slots)?,
+            statistics: Statistics::new(root, n_slots),
             data_files: rolling(layout::DATA, FRAMES, FrameRows::options(n_slots)),
             call_files: rolling(layout::CALLS, CALLS, CallRows::options()),
             scope_files: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),

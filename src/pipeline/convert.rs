@@ -1,11 +1,14 @@
 //! Stage `convert`: recordings become a dataset, which appears whole or not at all.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde_json::json;
 
 use crate::artifact::{FileEntry, IoError, PARTIAL_PREFIX, Plan, Receipt, StageDir};
-use crate::dataset::{self, RecordingEpisodes};
+use crate::dataset::{
+    self, ConvertConfig, ConvertError, ConvertSummary, FrameChoice, RecordedEpisode, RecordingEpisodes,
+};
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{PipelineError, Stage};
 use crate::recording::{RecordingError, ShardReader};
@@ -24,20 +27,15 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let partial = StageDir::new(Stage::Convert.name(), context.dir.root().join(format!("{PARTIAL_PREFIX}dataset")));
     partial.clear()?;
     let progress = context.progress(unit, manifest.episodes, "episodes");
-    let read = |file: &FileEntry| -> Result<_, RecordingError> {
-        let episodes = ShardReader::open(&recordings.path().join(&file.path))?;
-        Ok(RecordingEpisodes {
-            file: file.path.clone(),
-            sha256: file.sha256.clone(),
-            episodes: episodes.map(|episode| {
-                progress.inc(1);
-                context.go_on().map_err(Box::new)?;
-                episode.map_err(PipelineError::from).map_err(Box::new)
-            }),
-        })
+    let step = || {
+        progress.inc(1);
+        context.go_on()
     };
-    let files = manifest.files.iter().map(|file| read(file).map_err(PipelineError::from).map_err(Box::new));
-    let summary = dataset::convert(files, &context.pipeline.spec.convert, partial.path());
+    let source = Source { recordings: &recordings, files: &manifest.files, config: &context.pipeline.spec.convert };
+    let summary = match source.config.frames {
+        FrameChoice::Boundaries => source.convert(partial.path(), ShardReader::boundaries, step),
+        FrameChoice::All => source.convert(partial.path(), |reader| reader, step),
+    };
     context.go_on()?;
     let summary = summary?;
     let entries: Result<Vec<FileEntry>, IoError> =
@@ -55,4 +53,37 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     std::fs::rename(partial.path(), unit.dir.path()).map_err(IoError::system("rename to", unit.dir.path()))?;
     progress.finish(&format!("{} episodes, {} frames, {} calls", summary.episodes, summary.frames, summary.calls));
     Ok(())
+}
+
+/// The recordings to be converted, and how.
+struct Source<'a> {
+    recordings: &'a StageDir,
+    files: &'a [FileEntry],
+    config: &'a ConvertConfig,
+}
+
+impl Source<'_> {
+    /// Converts what `frames` takes of each recording; `step` is called before each episode and may end it.
+    fn convert<I, T>(
+        &self,
+        directory: &Path,
+        frames: impl Fn(ShardReader) -> I,
+        step: impl Fn() -> Result<(), PipelineError>,
+    ) -> Result<ConvertSummary, ConvertError>
+    where
+        I: Iterator<Item = Result<T, RecordingError>>,
+        T: RecordedEpisode,
+    {
+        let step = &step;
+        let read = |file: &FileEntry| -> Result<_, PipelineError> {
+            let reader = ShardReader::open(&self.recordings.path().join(&file.path))?;
+            let episodes = frames(reader).map(move |episode| {
+                step()?;
+                Ok(episode?)
+            });
+            let episodes = episodes.map(|episode: Result<T, PipelineError>| episode.map_err(Box::new));
+            Ok(RecordingEpisodes { file: file.path.clone(), sha256: file.sha256.clone(), episodes })
+        };
+        dataset::convert(self.files.iter().map(|file| read(file).map_err(Box::new)), self.config, directory)
+    }
 }

@@ -10,14 +10,30 @@ use super::transform::{self, GRIPPER};
 use super::{calls, observation};
 use crate::geometry::Pose;
 use crate::scene::SceneState;
-use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall};
+use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall, RecordedFrames};
+
+/// Which frames an episode is put together from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Keep {
+    #[default]
+    All,
+    Boundaries,
+}
+
+/// The parts of an episode; its spans count all frames, kept or not.
+pub(super) struct Assembled {
+    pub(super) parts: EpisodeParts,
+    pub(super) recorded: RecordedFrames,
+}
 
 /// Episodes being put together, one at a time. Its buffers are used again from message to message.
 #[derive(Default)]
 pub(super) struct Assembler {
+    keep: Keep,
     building: Option<Box<Building>>,
     call: proto::ProgramCall,
     returned: proto::ProgramReturn,
+    observed: Observed,
 }
 
 /// An episode of which the start has been read.
@@ -32,11 +48,20 @@ struct Building {
     transforms_at_nanos: Option<u64>,
     /// Where the search for a body's name begins: transforms come in the order of bodies.
     next_body: usize,
+    keep: Keep,
     frames: Vec<Frame>,
+    /// Times of all frames since the start.
+    times_nanos: Vec<u64>,
+    /// Positions of the boundary frames among all.
+    boundaries: Vec<u32>,
     calls: Vec<ProgramCall>,
 }
 
 impl Assembler {
+    pub(super) fn new(keep: Keep) -> Self {
+        Self { keep, ..Self::default() }
+    }
+
     /// Whether an episode has begun and not ended.
     pub(super) fn is_building(&self) -> bool {
         self.building.is_some()
@@ -48,12 +73,12 @@ impl Assembler {
         topic: Topic,
         log_time_nanos: u64,
         data: &[u8],
-    ) -> Result<Option<EpisodeParts>, MessageProblem> {
+    ) -> Result<Option<Assembled>, MessageProblem> {
         if topic == Topic::EpisodeStart {
             if self.building.is_some() {
                 return Err(MessageProblem::OutOfPlace("the episode before has not ended"));
             }
-            self.building = Some(Box::new(Building::new(log_time_nanos, data)?));
+            self.building = Some(Box::new(Building::new(self.keep, log_time_nanos, data)?));
             return Ok(None);
         }
         let Some(building) = &mut self.building else {
@@ -62,8 +87,8 @@ impl Assembler {
         match topic {
             Topic::Transforms => building.transforms(log_time_nanos, data)?,
             Topic::Observation => {
-                let observed = observation::decode(data, building.start.scene.slots.len())?;
-                building.observation(log_time_nanos, observed)?;
+                observation::decode(data, &mut self.observed)?;
+                building.observation(log_time_nanos, &self.observed)?;
             }
             Topic::Call => {
                 self.call.clear();
@@ -80,7 +105,7 @@ impl Assembler {
                 let end = proto::EpisodeEnd::decode(data)?;
                 building.check_end(&end)?;
                 let outcome = decode_outcome(&end)?;
-                return Ok(self.building.take().map(|building| building.parts(outcome)));
+                return Ok(self.building.take().map(|building| building.assembled(outcome)));
             }
             Topic::EpisodeStart | Topic::Stack | Topic::Scene | Topic::Event | Topic::Log => {}
         }
@@ -89,7 +114,7 @@ impl Assembler {
 }
 
 impl Building {
-    fn new(start_nanos: u64, data: &[u8]) -> Result<Self, MessageProblem> {
+    fn new(keep: Keep, start_nanos: u64, data: &[u8]) -> Result<Self, MessageProblem> {
         let start = start::decode(proto::EpisodeStart::decode(data)?)?;
         let n_bodies = start.scene.bodies.len();
         let state = SceneState {
@@ -107,7 +132,10 @@ impl Building {
             placed: vec![false; n_bodies + 1],
             transforms_at_nanos: None,
             next_body: 0,
+            keep,
             frames: Vec::new(),
+            times_nanos: Vec::new(),
+            boundaries: Vec::new(),
             calls: Vec::new(),
         })
     }
@@ -137,17 +165,24 @@ impl Building {
         Ok(position)
     }
 
-    fn observation(&mut self, log_time_nanos: u64, observed: Observed) -> Result<(), MessageProblem> {
-        let Observed { frame, boundary, opening_m, held, slots } = observed;
+    fn observation(&mut self, log_time_nanos: u64, observed: &Observed) -> Result<(), MessageProblem> {
+        let Observed { frame, boundary, opening_m, held, ref slots } = *observed;
         let transforms_nanos =
             self.transforms_at_nanos.take().ok_or(MessageProblem::Missing { field: "transforms" })?;
         expect("log time", log_time_nanos, transforms_nanos)?;
-        expect("frame", u64::from(frame), self.frames.len() as u64)?;
+        expect("frame", u64::from(frame), self.times_nanos.len() as u64)?;
         if self.unplaced > 0 {
             return Err(MessageProblem::Missing { field: "transform of a body" });
         }
-        let state = SceneState { opening_m, held, ..self.state.clone() };
-        self.frames.push(Frame { time_nanos: log_time_nanos - self.start_nanos, boundary, state, slots });
+        let time_nanos = log_time_nanos - self.start_nanos;
+        self.times_nanos.push(time_nanos);
+        if boundary {
+            self.boundaries.push(frame);
+        }
+        if boundary || self.keep == Keep::All {
+            let state = SceneState { opening_m, held, ..self.state.clone() };
+            self.frames.push(Frame { time_nanos, boundary, state, slots: slots.clone() });
+        }
         Ok(())
     }
 
@@ -161,15 +196,14 @@ impl Building {
     /// Messages of a frame stand at its time.
     fn check_time(&self, log_time_nanos: u64, frame: u32) -> Result<(), MessageProblem> {
         let out_of_range = MessageProblem::OutOfRange { field: "frame", found: u64::from(frame) };
-        let frame = self.frames.get(frame as usize).ok_or(out_of_range)?;
-        expect("log time", log_time_nanos, self.start_nanos + frame.time_nanos)
+        let time_nanos = self.times_nanos.get(frame as usize).ok_or(out_of_range)?;
+        expect("log time", log_time_nanos, self.start_nanos + time_nanos)
     }
 
     fn check_end(&self, message: &proto::EpisodeEnd) -> Result<(), MessageProblem> {
-        let boundary_frames = self.frames.iter().filter(|frame| frame.boundary).count();
         expect("index", message.index, self.start.provenance.index)?;
-        expect("number of frames", self.frames.len() as u64, u64::from(message.frames))?;
-        expect("number of boundary frames", boundary_frames as u64, u64::from(message.boundary_frames))?;
+        expect("number of frames", self.times_nanos.len() as u64, u64::from(message.frames))?;
+        expect("number of boundary frames", self.boundaries.len() as u64, u64::from(message.boundary_frames))?;
         expect("number of calls", self.calls.len() as u64, u64::from(message.calls))?;
         if self.transforms_at_nanos.is_some() {
             return Err(MessageProblem::OutOfPlace("the transforms before have no observation"));
@@ -180,9 +214,15 @@ impl Building {
         Ok(())
     }
 
-    fn parts(self, outcome: Outcome) -> EpisodeParts {
-        let Start { provenance, scene, specification_frames } = self.start;
-        EpisodeParts { provenance, scene, frames: self.frames, specification_frames, calls: self.calls, outcome }
+    fn assembled(self, outcome: Outcome) -> Assembled {
+        let Self { start, frames, times_nanos, boundaries, calls, .. } = self;
+        let Start { provenance, scene, specification_frames } = start;
+        let recorded = RecordedFrames {
+            positions: boundaries,
+            count: times_nanos.len() as u32,
+            end_nanos: times_nanos.last().copied().unwrap_or(0),
+        };
+        Assembled { parts: EpisodeParts { provenance, scene, frames, specification_frames, calls, outcome }, recorded }
     }
 }
 

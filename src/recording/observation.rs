@@ -40,9 +40,11 @@ pub(super) fn encode(position: u32, frame: &Frame) -> proto::Observation {
     }
 }
 
-/// Reads an observation of about `n_slots` slots.
-pub(super) fn decode(mut message: &[u8], n_slots: usize) -> Result<Observed, MessageProblem> {
-    let mut observed = Observed { slots: Vec::with_capacity(n_slots), ..Observed::default() };
+/// Reads an observation in the place of the one before, whose memory it takes over.
+pub(super) fn decode(mut message: &[u8], observed: &mut Observed) -> Result<(), MessageProblem> {
+    let mut slots = std::mem::take(&mut observed.slots);
+    slots.clear();
+    *observed = Observed { slots, ..Observed::default() };
     while !message.is_empty() {
         match wire::key(&mut message)? {
             (FRAME, WireType::Varint) => observed.frame = narrow("frame", wire::varint(&mut message)?)?,
@@ -59,7 +61,7 @@ pub(super) fn decode(mut message: &[u8], n_slots: usize) -> Result<Observed, Mes
             (field, wire_type) => wire::skip(field, wire_type, &mut message)?,
         }
     }
-    Ok(observed)
+    Ok(())
 }
 
 fn body(field: &'static str, number: u64) -> Result<BodyIndex, MessageProblem> {
@@ -75,7 +77,14 @@ mod tests {
     use prost::Message as _;
 
     use super::super::schema::proto;
-    use super::{BodyIndex, Observed, decode};
+    use super::{BodyIndex, MessageProblem, Observed};
+
+    fn decode(message: &[u8]) -> Result<Observed, MessageProblem> {
+        let before =
+            Observed { boundary: true, held: Some(BodyIndex(3)), slots: vec![BodyIndex(9)], ..Observed::default() };
+        let mut observed = before;
+        super::decode(message, &mut observed).map(|()| observed)
+    }
 
     #[test]
     fn what_the_generated_type_writes_is_read() {
@@ -94,12 +103,12 @@ mod tests {
             held: Some(BodyIndex(0)),
             slots: vec![BodyIndex(0), BodyIndex(7), BodyIndex(200)],
         };
-        assert_eq!(decode(&message.encode_to_vec(), 3), Ok(expected));
-        assert_eq!(decode(&[], 3), Ok(Observed::default()));
+        assert_eq!(decode(&message.encode_to_vec()), Ok(expected));
+        assert_eq!(decode(&[]), Ok(Observed::default()));
     }
 
     #[test]
     fn numbers_that_are_not_packed_are_read() {
-        assert_eq!(decode(&[0x28, 4, 0x28, 5], 2).unwrap().slots, [BodyIndex(4), BodyIndex(5)]);
+        assert_eq!(decode(&[0x28, 4, 0x28, 5]).unwrap().slots, [BodyIndex(4), BodyIndex(5)]);
     }
 }

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::assembler::Assembler;
+use super::assembler::{Assembled, Assembler, Keep};
 use super::error::RecordingError;
 use super::index::Index;
 use super::stream::{RawMessage, Stream};
 use crate::artifact::IoError;
 use crate::task::Family;
-use crate::trace::{Episode, EpisodeParts};
+use crate::trace::{Boundaries, Episode, TraceError};
 
 /// A recording being read. Iterating gives its episodes in the order of writing and ends with the first error.
 ///
@@ -65,6 +65,12 @@ impl ShardReader {
         self.index.n_episodes()
     }
 
+    /// Reads only the boundary frames of each episode, from the next one on.
+    #[must_use]
+    pub fn boundaries(self) -> BoundaryReader {
+        BoundaryReader(Self { assembler: Assembler::new(Keep::Boundaries), ..self })
+    }
+
     /// One episode, by its position in the file from 0. Iteration is not disturbed.
     ///
     /// # Errors
@@ -80,8 +86,8 @@ impl ShardReader {
             }
             take(&self.path, &self.index, &mut assembler, position, message)
         })?;
-        let parts = episode.ok_or_else(|| RecordingError::Unfinished { path: self.path.clone(), episode: position })?;
-        self.check(position, parts)
+        let whole = episode.ok_or_else(|| RecordingError::Unfinished { path: self.path.clone(), episode: position })?;
+        self.check(position, || Episode::new(whole.parts))
     }
 
     fn start_of(&mut self, position: u64) -> Result<(u64, u64), RecordingError> {
@@ -95,23 +101,33 @@ impl ShardReader {
         start.ok_or_else(|| RecordingError::NoSuchEpisode { path: self.path.clone(), position, episodes })
     }
 
-    fn next_episode(&mut self) -> Result<Option<Episode>, RecordingError> {
-        let Self { path, index, stream, assembler, position, .. } = self;
-        let Some(stream) = stream else { return Ok(None) };
-        let parts = stream.messages(|message| take(path, index, assembler, *position, message))?;
-        let episode = *position;
-        match parts {
-            Some(parts) => {
-                self.position += 1;
-                self.check(episode, parts).map(Some)
-            }
-            None if assembler.is_building() => Err(RecordingError::Unfinished { path: path.clone(), episode }),
-            None => Ok(None),
+    /// The next episode's parts, checked by `new`. After an error, and at the end, there are no more.
+    fn next_checked<T>(
+        &mut self,
+        new: impl FnOnce(Assembled) -> Result<T, TraceError>,
+    ) -> Option<Result<T, RecordingError>> {
+        let episode = self.position;
+        let next =
+            self.next_assembled().and_then(|next| next.map(|next| self.check(episode, || new(next))).transpose());
+        if !matches!(next, Ok(Some(_))) {
+            self.stream = None;
         }
+        next.transpose()
     }
 
-    fn check(&self, episode: u64, parts: EpisodeParts) -> Result<Episode, RecordingError> {
-        Episode::new(parts).map_err(|source| RecordingError::Trace { path: self.path.clone(), episode, source })
+    fn next_assembled(&mut self) -> Result<Option<Assembled>, RecordingError> {
+        let Self { path, index, stream, assembler, position, .. } = self;
+        let Some(stream) = stream else { return Ok(None) };
+        let assembled = stream.messages(|message| take(path, index, assembler, *position, message))?;
+        if assembled.is_none() && assembler.is_building() {
+            return Err(RecordingError::Unfinished { path: path.clone(), episode: *position });
+        }
+        *position += u64::from(assembled.is_some());
+        Ok(assembled)
+    }
+
+    fn check<T>(&self, episode: u64, new: impl FnOnce() -> Result<T, TraceError>) -> Result<T, RecordingError> {
+        new().map_err(|source| RecordingError::Trace { path: self.path.clone(), episode, source })
     }
 }
 
@@ -119,11 +135,19 @@ impl Iterator for ShardReader {
     type Item = Result<Episode, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let next = self.next_episode().transpose();
-        if !matches!(next, Some(Ok(_))) {
-            self.stream = None;
-        }
-        next
+        self.next_checked(|Assembled { parts, .. }| Episode::new(parts))
+    }
+}
+
+/// A recording of which only boundary frames are read. Iterating goes on as that of [`ShardReader`] does; of the frames
+/// that are passed over, the poses and slots are not held to the rules of the trace.
+pub struct BoundaryReader(ShardReader);
+
+impl Iterator for BoundaryReader {
+    type Item = Result<Boundaries, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.next_checked(|Assembled { parts, recorded }| Boundaries::new(parts, recorded))
     }
 }
 
@@ -138,7 +162,7 @@ fn take(
     assembler: &mut Assembler,
     episode: u64,
     message: &RawMessage<'_>,
-) -> Result<ControlFlow<EpisodeParts>, RecordingError> {
+) -> Result<ControlFlow<Assembled>, RecordingError> {
     let &RawMessage { channel, sequence, log_time_nanos, data, offset } = message;
     let topic = index.topic(channel, sequence).map_err(|source| RecordingError::Damaged {
         path: path.to_owned(),
@@ -147,7 +171,7 @@ fn take(
     })?;
     let Some(topic) = topic else { return Ok(ControlFlow::Continue(())) };
     match assembler.message(topic, log_time_nanos, data) {
-        Ok(Some(parts)) => Ok(ControlFlow::Break(parts)),
+        Ok(Some(assembled)) => Ok(ControlFlow::Break(assembled)),
         Ok(None) => Ok(ControlFlow::Continue(())),
         Err(problem) => {
             let (path, topic) = (path.to_owned(), topic.name());

@@ -20,6 +20,14 @@ static QUIET_HOOK: Once = Once::new();
 
 /// Runs a step of reading. What it borrows must not be used again after an error.
 pub(crate) fn guarded<T>(path: &Path, step: impl FnOnce() -> Result<T, TableError>) -> Result<T, TableError> {
+    catch_panic(step).unwrap_or_else(|words| {
+        let source = ParquetError::General(format!("the file is corrupted: {words}"));
+        Err(TableError::parquet(path)(source))
+    })
+}
+
+/// Runs a step of another's code. What it borrows must not be used again after a panic, whose words are the error.
+pub(crate) fn catch_panic<T>(step: impl FnOnce() -> T) -> Result<T, String> {
     QUIET_HOOK.call_once(|| {
         let loud = take_hook();
         set_hook(Box::new(move |panic| {
@@ -31,10 +39,8 @@ pub(crate) fn guarded<T>(path: &Path, step: impl FnOnce() -> Result<T, TableErro
     let before = GUARDED.replace(true);
     let result = catch_unwind(AssertUnwindSafe(step));
     GUARDED.set(before);
-    result.unwrap_or_else(|panic| {
+    result.map_err(|panic| {
         let words = panic.downcast_ref::<&str>().map(|words| (*words).to_owned());
-        let words = words.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-        let source = ParquetError::General(format!("the file is corrupted: {words}"));
-        Err(TableError::parquet(path)(source))
+        words.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
     })
 }

@@ -20,6 +20,9 @@ use crate::table::{Column, ColumnKind, TableError, TableSchema};
 /// Named in every file. The same for every run of this version.
 const CREATED_BY: &str = concat!("ntp version ", env!("CARGO_PKG_VERSION"));
 
+/// Where a page of a column ends: small enough for a processor's cache, and for a reader that skips pages.
+const PAGE_BYTES: usize = 1 << 16;
+
 /// Writes a table.
 ///
 /// # Errors
@@ -161,6 +164,7 @@ impl TableWriter {
 fn properties(parsed: &ParsedSchema, options: WriteOptions) -> WriterProperties {
     let mut builder =
         WriterProperties::builder().set_created_by(CREATED_BY.to_owned()).set_compression(Compression::SNAPPY);
+    builder = builder.set_data_page_size_limit(PAGE_BYTES);
     if !options.sorted_by.is_empty() {
         builder = builder.set_statistics_enabled(EnabledStatistics::None);
     }

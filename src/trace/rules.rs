@@ -1,5 +1,6 @@
 //! The rules of frames and of the program tree, and what breaks them.
 
+use crate::geometry::Pose;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
 use crate::trace::{CallId, Frame, Outcome, ProgramCall, Span};
@@ -30,6 +31,8 @@ pub enum TraceError {
     NoCalls,
     #[error("call {call}: {problem}")]
     Call { call: u32, problem: CallProblem },
+    #[error("call {call}: frames {span:?} do not begin and end at boundary frames")]
+    OffBoundary { call: u32, span: Span },
 }
 
 /// A rule of the program tree that a call breaks.
@@ -109,12 +112,17 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
     if let Some(body) = value.state.held.filter(|body| usize::from(body.0) >= n_bodies) {
         return Err(TraceError::HeldBody { frame, body: body.0, bodies: n_bodies });
     }
-    let all_poses = poses.iter().chain([&value.state.gripper_in_world]);
-    let mut numbers = all_poses.flat_map(|pose| pose.translation.vector.iter().chain(pose.rotation.coords.iter()));
-    if numbers.any(|number| !number.is_finite()) {
+    let all_finite = poses.iter().fold(is_finite(&value.state.gripper_in_world), |all, pose| all & is_finite(pose));
+    if !all_finite {
         return Err(TraceError::NotFinite { frame });
     }
     Ok(())
+}
+
+/// Without a branch per number: every pose of every frame is looked at.
+fn is_finite(pose: &Pose) -> bool {
+    let finite = |numbers: &[f32]| numbers.iter().fold(true, |all, number| all & number.is_finite());
+    finite(pose.translation.vector.as_slice()) & finite(pose.rotation.coords.as_slice())
 }
 
 /// Holds every rule of the program tree, for calls among `n_frames` frames whose arguments are among `n_slots` slots.

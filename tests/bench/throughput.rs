@@ -216,7 +216,7 @@ fn start(task: &Task, demonstration: Episode) -> Start<'_> {
 fn convert_all(recordings: &Path, out: &Path) -> u64 {
     let read = |shard: u32| -> Result<_, RecordingError> {
         let file = format!("shard-{shard:05}.mcap");
-        let episodes = ShardReader::open(&recordings.join(&file))?;
+        let episodes = ShardReader::open(&recordings.join(&file))?.boundaries();
         Ok(RecordingEpisodes { file, sha256: String::new(), episodes })
     };
     let summary = convert((0..4).map(read), &ConvertConfig::default(), out).expect("recordings can be converted");

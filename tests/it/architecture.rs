@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules in reading order: each may use those before it and none after it. `rollout` and `trace` use the task's
 /// types; `task` names no later module.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "geometry",
     "seed",
     "scene",
@@ -25,6 +25,7 @@ const ORDER: [&str; 21] = [
     "rollout",
     "visualize",
     "report",
+    "query",
     "pipeline",
     "cli",
 ];
@@ -35,7 +36,7 @@ const OWNERS: [(&str, &[&str]); 7] = [
     ("burn", &["model", "training", "rollout/learned"]),
     ("mcap", &["recording"]),
     ("rerun", &["visualize"]),
-    ("polars", &["report"]),
+    ("polars", &["report", "query"]),
     ("arrow", &["table", "dataset"]),
     ("parquet", &["table", "dataset"]),
 ];

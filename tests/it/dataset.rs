@@ -1,5 +1,6 @@
 //! Recordings to a dataset and back: what a learner reads is what the episodes hold, and faults are named.
 
+use std::collections::BTreeSet;
 use std::convert::Infallible;
 use std::path::Path;
 
@@ -668,4 +669,23 @@ fn findings_beyond_the_first_hundred_are_counted() {
     let validation = validate(folder.path());
     assert_eq!(validation.findings.len(), 100);
     assert_eq!(validation.findings.len() as u64 + validation.findings_left_out, validation.scopes);
+}
+
+#[test]
+fn every_code_of_a_finding_is_documented_and_no_other() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let sources = ["finding.rs", "validate.rs", "validate/episode.rs", "validate/frames.rs", "validate/meta.rs"];
+    let sources = sources.into_iter().chain(["validate/scopes.rs"]);
+    let text: String =
+        sources.map(|file| std::fs::read_to_string(root.join("src/dataset").join(file)).unwrap()).collect();
+    let is_code = |word: &&str| {
+        let groups =
+            ["calls.", "episodes.", "file.", "frames.", "info.", "meta.", "scopes.", "split.", "stats.", "tasks."];
+        groups.iter().any(|group| word.starts_with(group)) && word.chars().all(|c| c.is_ascii_lowercase() || c == '.')
+    };
+    let used: BTreeSet<&str> = text.split('"').filter(is_code).collect();
+    let page = std::fs::read_to_string(root.join("schemas/findings.md")).unwrap();
+    let documented: BTreeSet<&str> = page.split('`').filter(is_code).collect();
+    assert!(used.len() > 20);
+    assert_eq!(used, documented);
 }

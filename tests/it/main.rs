@@ -19,6 +19,8 @@ mod pipeline;
 #[cfg(test)]
 mod pipeline_suites;
 #[cfg(test)]
+mod query;
+#[cfg(test)]
 mod recording;
 #[cfg(test)]
 mod report;

@@ -123,6 +123,22 @@ fn a_shard_of_many_chunks_is_read_in_order_and_by_position() {
 }
 
 #[test]
+fn boundaries_are_read_as_the_episode_without_other_frames() {
+    let written = stacking_episodes(12);
+    let with_more: Vec<Episode> = written.iter().map(|episode| crate::dataset::densify(episode, 3)).collect();
+    let recording = Recording::of(&with_more);
+    let found: Vec<_> = ShardReader::open(&recording.path()).unwrap().boundaries().map(Result::unwrap).collect();
+    assert_eq!(found.len(), written.len());
+    for (found, recorded) in found.iter().zip(&with_more) {
+        assert_eq!(*found.episode(), recorded.clone().boundaries_only());
+        let positions: Vec<u32> = recorded.boundary_frames().map(|(at, _)| at as u32).collect();
+        assert_eq!(found.recorded().positions, positions);
+        assert_eq!(found.recorded().count as usize, recorded.frames.len());
+        assert_eq!(found.recorded().end_nanos, recorded.frames.last().unwrap().time_nanos);
+    }
+}
+
+#[test]
 fn an_episode_behind_the_last_is_refused() {
     let recording = Recording::of(&stacking_episodes(2));
     let mut reader = ShardReader::open(&recording.path()).unwrap();

@@ -1,0 +1,52 @@
+//! Why there is no answer.
+
+use std::path::PathBuf;
+
+use polars::prelude::PolarsError;
+
+use crate::artifact::IoError;
+use crate::dataset::DatasetError;
+
+/// A query without an answer.
+#[derive(Debug, thiserror::Error)]
+pub enum QueryError {
+    /// A dataset's tables are not as it says.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A table could not be opened.
+    #[error("{}: {source}", path.display())]
+    Table {
+        /// Which file.
+        path: PathBuf,
+        /// What Polars said.
+        source: PolarsError,
+    },
+    /// The statement was refused, or failed while it was answered.
+    #[error("{source}; tables are {}", tables.join(", "))]
+    Refused {
+        /// What Polars said.
+        source: PolarsError,
+        /// The tables that there are.
+        tables: Vec<&'static str>,
+    },
+    /// Polars broke off on a statement that it should have refused.
+    #[error("the statement cannot be answered: {words}")]
+    Panic {
+        /// What it said.
+        words: String,
+    },
+    /// A format has no place for a value.
+    #[error("column {column:?} is {kind}, for which CSV has no form; choose other columns, JSON or Parquet")]
+    NoForm {
+        /// Which column.
+        column: String,
+        /// Its type.
+        kind: String,
+    },
+    /// The answer could not be encoded.
+    #[error("the answer cannot be written: {0}")]
+    Encode(PolarsError),
+}

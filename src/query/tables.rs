@@ -1,0 +1,111 @@
+//! The files behind each table.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use polars::prelude::{IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, UnionArgs, concat, lit};
+use serde::Serialize;
+
+use crate::dataset;
+use crate::query::QueryError;
+
+/// Tables by name, each of any number of files.
+#[derive(Clone, Debug, Default)]
+pub struct Tables(BTreeMap<&'static str, Vec<Source>>);
+
+/// A file, and the model that it is of, for a table that does not say so itself.
+#[derive(Clone, Debug)]
+struct Source {
+    path: PathBuf,
+    model: Option<String>,
+}
+
+/// What a table holds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct TableInfo {
+    /// Its name in statements.
+    pub table: &'static str,
+    /// Files that it is read from.
+    pub files: usize,
+    /// Names and types of its columns.
+    pub columns: Vec<(String, String)>,
+}
+
+impl Tables {
+    /// Adds the tables of a dataset.
+    ///
+    /// # Errors
+    ///
+    /// When a file is missing or has another number of rows than the dataset counts.
+    pub fn add_dataset(&mut self, root: &Path) -> Result<(), QueryError> {
+        for (name, files) in dataset::table_files(root)? {
+            files.into_iter().for_each(|path| self.add(name, path, None));
+        }
+        Ok(())
+    }
+
+    /// Adds a `rollouts.parquet`.
+    pub fn add_rollouts(&mut self, path: &Path) {
+        self.add("rollouts", path.to_owned(), None);
+    }
+
+    /// Adds the `metrics.parquet` of a model.
+    pub fn add_metrics(&mut self, path: &Path, model: &str) {
+        self.add("metrics", path.to_owned(), Some(model.to_owned()));
+    }
+
+    fn add(&mut self, name: &'static str, path: PathBuf, model: Option<String>) {
+        self.0.entry(name).or_default().push(Source { path, model });
+    }
+
+    /// The tables that there are.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.0.keys().copied().collect()
+    }
+
+    /// The tables with their columns.
+    ///
+    /// # Errors
+    ///
+    /// When a file cannot be opened.
+    pub fn describe(&self) -> Result<Vec<TableInfo>, QueryError> {
+        let frames = self.scan()?;
+        let infos = frames.into_iter().zip(self.0.values()).map(|((table, mut frame), sources)| {
+            let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
+            let schema = frame.collect_schema().map_err(|source| QueryError::Table { path, source })?;
+            let columns = schema.iter().map(|(name, kind)| (name.to_string(), kind.to_string())).collect();
+            Ok(TableInfo { table, files: sources.len(), columns })
+        });
+        infos.collect()
+    }
+
+    /// Opens every table; no row is read.
+    pub(super) fn scan(&self) -> Result<Vec<(&'static str, LazyFrame)>, QueryError> {
+        self.0.iter().map(|(&name, sources)| Ok((name, union(sources)?))).collect()
+    }
+}
+
+/// The files of a table as one. Where they do not say which model they are of, they are read at once: learning curves
+/// are short, and Polars cannot count the rows of a union of lazy frames without its 128-bit numbers.
+fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
+    let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
+    let unreadable = |source: PolarsError| QueryError::Table { path: path.clone(), source };
+    if sources.iter().all(|source| source.model.is_none()) {
+        return scan(sources.iter().map(|source| source.path.as_path())).map_err(unreadable);
+    }
+    let with_model = |source: &Source| {
+        let model = source.model.clone().unwrap_or_default();
+        Ok(scan([source.path.as_path()])?.with_columns([lit(model).alias("model")]))
+    };
+    let frames = sources.iter().map(with_model).collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
+    let rows = concat(&frames, UnionArgs::default()).and_then(LazyFrame::collect).map_err(unreadable)?;
+    Ok(rows.lazy())
+}
+
+fn scan<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<LazyFrame, PolarsError> {
+    let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
+    let paths = paths.into_iter().map(PlRefPath::try_from_path).collect::<Result<Vec<_>, _>>()?;
+    let mut frame = LazyFrame::scan_parquet_files(paths.into(), options)?;
+    frame.collect_schema()?;
+    Ok(frame)
+}
