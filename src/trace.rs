@@ -10,6 +10,7 @@
 mod call;
 mod episode;
 mod frame;
+mod instruction;
 mod outcome;
 mod recorder;
 mod rules;
@@ -18,6 +19,9 @@ mod span;
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
 pub use frame::{Frame, Observation};
+pub use instruction::{
+    Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
+};
 pub use outcome::{Cause, Outcome};
 pub use recorder::{CallRecorder, NewCall};
 pub use rules::{CallProblem, TraceError, check_calls};

@@ -11,7 +11,7 @@ use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
-use ntp::trace::{Actor, Episode, Provenance, Span};
+use ntp::trace::{Actor, Episode, Provenance, Span, instructions};
 use ntp::training::{
     Curriculum, Example, Examples, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
     Training, draw, train,
@@ -29,6 +29,7 @@ fn trial_data(episode: &Episode) -> TrialData {
         n_frames: episode.frames.len(),
         observations: frames.flatten().collect(),
         calls: episode.calls.clone(),
+        instructions: instructions(&episode.calls, &episode.scene.slots),
     }
 }
 
