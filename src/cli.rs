@@ -54,7 +54,7 @@ pub enum Command {
 /// How stages run.
 #[derive(Debug, Args)]
 pub struct StageArgs {
-    /// The pipeline file.
+    /// The pipeline file, or a study that names several.
     #[arg(value_name = "PIPELINE.toml")]
     pub pipeline: PathBuf,
     /// The run directory [default: data/runs/NAME].

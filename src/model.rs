@@ -1,7 +1,7 @@
 //! NTP in burn: encoders, interpreter, core, program memory, argument decoder.
 //!
-//! A variant is a type that implements [`Network`] and shares its parts with the others: the program memory, the
-//! reactive core, the scoping head, the temporal convolution.
+//! A variant is a type that implements [`Network`] and is put together from parts, which are types too: an
+//! [`Encoder`], a [`Core`] and a [`Scoping`]. All share the program memory.
 //!
 //! # Shapes
 //!
@@ -16,25 +16,39 @@
 //!
 //! Paper, section IV.
 
+mod build;
 mod config;
+mod core_network;
+mod decisions;
 mod decoder;
+mod encoder;
 mod features;
 mod flattened;
-mod heads;
 mod layers;
 mod memory;
 mod network;
 mod object_centric;
+mod programmer;
+mod scoping;
 mod store;
+mod variant;
+mod windows;
 
-pub use config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
+pub use build::{NetworkUse, with_network};
+pub use config::{ModelConfig, NetworkConfig};
+pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
+pub use decisions::Decisions;
 pub use decoder::{Decoder, LabelScores, span_score};
+pub use encoder::{ArgumentDecoder, Encoder, Widths};
 pub use flattened::{FlatDemonstration, FlatReading, Flattened, FlattenedConfig};
-pub use heads::{CoreOutput, ScopeHead};
 pub use memory::ProgramMemory;
-pub use network::{Network, Windows};
+pub use network::{CoreOutput, Network};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
+pub use programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope, Programmer};
+pub use scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,
 };
+pub use variant::{Architecture, EncoderKind, Variant};
+pub use windows::Windows;

@@ -4,7 +4,8 @@
 //!
 //! [`Pipeline::load`] turns a TOML file (pipelines/*.toml, schemas/pipeline.schema.json) into checked settings before
 //! anything is written. [`run`] composes the stages; no stage calls another. Each stage writes one folder under the
-//! run directory through [`crate::artifact::StageDir`].
+//! run directory through [`crate::artifact::StageDir`]. A [`Study`] is several pipelines and one report of them all;
+//! [`PipelineFile::load`] tells the two kinds of files apart.
 //!
 //! # Invariants
 //!
@@ -12,6 +13,7 @@
 //! number of jobs gives the same bytes.
 
 mod convert;
+mod costs;
 mod error;
 mod generate;
 mod layout;
@@ -21,6 +23,7 @@ mod rollout;
 mod runner;
 mod spec;
 mod stage;
+mod study;
 mod tasks;
 mod train;
 mod trials;
@@ -29,9 +32,10 @@ mod verify;
 pub use error::PipelineError;
 pub use layout::RunDir;
 pub use resolve::Pipeline;
-pub use runner::{Options, StageReport, Status, run};
+pub use runner::{Options, StageReport, Status, run, run_study};
 pub use spec::{
     CountsSpec, GenerateSpec, ModelSpec, PipelineSpec, RecordedFrames, ReportSpec, RolloutSpec, SuiteSpec, TasksSpec,
 };
 pub use stage::Stage;
+pub use study::{PipelineFile, Study, StudySpec};
 pub use verify::{Verification, verify};

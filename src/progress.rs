@@ -1,11 +1,12 @@
 //! Progress of long work on stderr: bars with ETA on a terminal, plain lines elsewhere.
 //!
-//! The only reader of a clock in the library; nothing of it reaches a file.
+//! The only reader of clocks in the library. What [`Stopwatch`] reads reaches `costs.json` and the report, nothing else.
 
 use std::io::{IsTerminal as _, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use cpu_time::ProcessTime;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// At most one plain line in so long.
@@ -106,9 +107,39 @@ impl Progress {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "progress is for people; it reaches no file")]
+#[expect(clippy::disallowed_methods, reason = "the one place that reads the clock")]
 fn now() -> Instant {
     Instant::now()
+}
+
+/// Measures what work takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    began: Instant,
+    /// `None` where the system does not say.
+    cpu: Option<ProcessTime>,
+}
+
+/// What work took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taken {
+    /// CPU-seconds of the process, all threads together.
+    pub cpu_secs: f64,
+    /// Seconds on the clock.
+    pub wall_secs: f64,
+}
+
+impl Stopwatch {
+    /// Begins to measure.
+    pub fn start() -> Self {
+        Self { began: now(), cpu: ProcessTime::try_now().ok() }
+    }
+
+    /// What was taken since.
+    pub fn taken(&self) -> Taken {
+        let cpu = self.cpu.and_then(|cpu| cpu.try_elapsed().ok()).unwrap_or_default();
+        Taken { cpu_secs: cpu.as_secs_f64(), wall_secs: self.began.elapsed().as_secs_f64() }
+    }
 }
 
 /// One line on stderr. Nothing is left to do when stderr is closed.

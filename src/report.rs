@@ -3,16 +3,19 @@
 //! # Input and output
 //!
 //! Reads rollouts.parquet and metrics.parquet files (schemas/parquet/); writes `report.json`
-//! (schemas/report.schema.json), `results.csv`, `curves.csv` and `index.html`, which needs no other file.
+//! (schemas/report.schema.json), `report.md`, `results.csv`, `curves.csv` and `index.html`, which needs no other file.
 //!
 //! # Invariants
 //!
-//! The same inputs give the same bytes: no clock, no host, no thread count and no order of rows shows.
+//! The same inputs give the same bytes: no clock, no host, no thread count and no order of rows shows. One input is
+//! measured: what stages took ([`ReportInputs::costs`], and each model's own). Two equal runs differ in that alone.
 
+mod aggregate;
 mod chart;
 mod csv;
 mod frames;
 mod interval;
+mod markdown;
 mod metrics;
 mod order;
 mod page;
@@ -23,7 +26,11 @@ mod summary;
 pub use interval::wilson;
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
-pub use summary::{Aggregate, Divergence, Fact, InputFile, Report, SuiteResult, TrainingEnd};
+pub use rollouts::RolloutsInput;
+pub use summary::{
+    Actor, Aggregate, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult,
+    TrainingEnd,
+};
 
 use std::path::{Path, PathBuf};
 
@@ -37,11 +44,15 @@ pub struct ReportInputs {
     /// What the run is called.
     pub title: String,
     /// rollouts.parquet files, in any order.
-    pub rollouts: Vec<PathBuf>,
+    pub rollouts: Vec<RolloutsInput>,
     /// metrics.parquet files, in any order.
     pub metrics: Vec<MetricsInput>,
     /// What else there is to say of the run, in the order it is to be told.
     pub facts: Vec<Fact>,
+    /// What each stage took, as far as it was measured.
+    pub costs: Vec<StageCost>,
+    /// Of which commits the pipeline files were.
+    pub commits: Vec<String>,
     /// What to set beside the results; [`paper_values`] as a rule.
     pub paper: Vec<PaperValue>,
 }
@@ -81,10 +92,10 @@ pub enum ReportError {
         problem: &'static str,
     },
     /// An episode would count twice.
-    #[error("{rows} episodes of variant {variant}, suite {suite}, training seed {seed} occur more than once")]
+    #[error("{rows} episodes of {}, suite {suite}, training seed {seed} occur more than once", told(actor))]
     Repeated {
-        /// Of which variant.
-        variant: String,
+        /// Of which actor.
+        actor: Box<Actor>,
         /// In which suite.
         suite: String,
         /// Of which training seed.
@@ -100,6 +111,19 @@ pub enum ReportError {
     Page(#[from] minijinja::Error),
 }
 
+/// An actor for an error.
+fn told(actor: &Actor) -> String {
+    let Actor { experiment, variant, train_tasks, specification: _, decoder } = actor;
+    let mut told = format!("experiment {experiment}, variant {variant}");
+    if let Some(tasks) = train_tasks {
+        told.push_str(&format!(" trained on {tasks} tasks"));
+    }
+    if let Some(decoder) = decoder {
+        told.push_str(&format!(", decoder {decoder}"));
+    }
+    told
+}
+
 /// Makes a report in the folder `out`.
 ///
 /// # Errors
@@ -113,10 +137,14 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         schema_version: summary::SCHEMA_VERSION,
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
         title: inputs.title.clone(),
-        aggregates: rollouts::aggregates(&rollouts.results, &inputs.paper),
+        aggregates: aggregate::aggregates(&rollouts.results, &inputs.paper),
         results: rollouts.results,
         divergences: rollouts.divergences,
+        errors: rollouts.errors,
         training: metrics::ends(&curves),
+        models: inputs.metrics.iter().map(|metrics| metrics.model.clone()).collect(),
+        costs: inputs.costs.clone(),
+        commits: inputs.commits.clone(),
         paper: inputs.paper.clone(),
         facts: inputs.facts.clone(),
         inputs: files,
@@ -125,6 +153,7 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
     artifact::write(&out.join("results.csv"), &csv::results(&report.results)?)?;
     artifact::write(&out.join("curves.csv"), &csv::curves(&curves)?)?;
     artifact::write(&out.join("index.html"), page.as_bytes())?;
+    artifact::write(&out.join("report.md"), markdown::render(&report).as_bytes())?;
     artifact::write_json(&out.join("report.json"), &report)?;
     Ok(report)
 }
@@ -138,7 +167,8 @@ pub fn json_schema() -> serde_json::Value {
 /// so that a run can be moved without a change of bytes.
 fn input_files(inputs: &ReportInputs, out: &Path) -> Result<Vec<InputFile>, IoError> {
     let run_dir = out.parent().unwrap_or(out);
-    let paths = inputs.rollouts.iter().chain(inputs.metrics.iter().map(|metrics| &metrics.path));
+    let paths =
+        inputs.rollouts.iter().map(|rollouts| &rollouts.path).chain(inputs.metrics.iter().map(|metrics| &metrics.path));
     let file = |path: &PathBuf| {
         let shown = path.strip_prefix(run_dir).unwrap_or(path);
         Ok(InputFile { path: shown.display().to_string(), sha256: artifact::sha256_file(path)? })

@@ -19,4 +19,4 @@ pub use interpreter::{Limits, RolloutEpisode, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};
-pub use rows::RolloutRows;
+pub use rows::{Acted, RolloutRows};

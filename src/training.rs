@@ -25,7 +25,7 @@ mod metrics;
 
 pub use batch::{Part, draw};
 pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};
-pub use examples::{Example, Examples};
+pub use examples::{Example, Examples, Grain};
 pub use learner::{Learner, Losses, losses};
 pub use metrics::Metric;
 
@@ -37,8 +37,7 @@ use sha2::{Digest as _, Sha256};
 use crate::artifact::{self, IoError};
 use crate::dataset::DatasetTrials;
 use crate::model::{
-    CONFIG_FILE, Flattened, ModelConfig, ModelError, Network, NetworkConfig, ObjectCentric, WEIGHTS_FILE,
-    weights_to_bytes,
+    CONFIG_FILE, ModelConfig, ModelError, Network, NetworkUse, WEIGHTS_FILE, weights_to_bytes, with_network,
 };
 use crate::seed::Seed;
 use crate::table::TableError;
@@ -161,17 +160,34 @@ pub fn train(
 ) -> Result<TrainSummary, TrainError> {
     training.config.check()?;
     let training = training.resolved();
-    let examples = Examples::new(data)?;
     let family = family(data)?;
     let written =
         serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
     let model = ModelConfig::new(training.variant, family, data.n_slots, written);
     let device = Device::flex().autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
-    let run = Run { config: &training.config, examples: &examples, model: &model, folder, seed };
-    match model.network {
-        NetworkConfig::ObjectCentric(widths) => run.train(ObjectCentric::new(&widths, seed, &device), hooks),
-        NetworkConfig::Flattened(widths) => run.train(Flattened::new(&widths, data.n_slots, seed, &device), hooks),
+    let learning = Learning { config: &training.config, data, model: &model, folder, seed, hooks };
+    with_network(&model, seed, &device, learning)
+}
+
+/// A training that waits for its network.
+struct Learning<'r, 'h> {
+    config: &'r TrainConfig,
+    data: &'r DatasetTrials,
+    model: &'r ModelConfig,
+    folder: &'r Path,
+    seed: Seed,
+    hooks: &'r mut Hooks<'h>,
+}
+
+impl NetworkUse for Learning<'_, '_> {
+    type Output = Result<TrainSummary, TrainError>;
+
+    fn run<N: Network>(self, network: N) -> Self::Output {
+        let Self { config, data, model, folder, seed, hooks } = self;
+        let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
+        let examples = Examples::of(data, N::DECISIONS, grain)?;
+        Run { config, examples: &examples, model, folder, seed }.train(network, hooks)
     }
 }
 
@@ -243,20 +259,21 @@ impl Run<'_> {
         let learning_rate = self.config.learning_rate_at(standing.step);
         let chosen = standing.errors.levels(self.config.curriculum, step_seed.derive("levels", &[]));
         let levels: Vec<_> = self.examples.levels().collect();
-        let sizes: Vec<usize> = chosen.iter().map(|&level| self.batch_size(levels[level].1)).collect();
-        let batches: Vec<Vec<Part>> = (chosen.iter().zip(&sizes).enumerate())
-            .map(|(position, (&level, &size))| {
+        let batches: Vec<Vec<Part>> = (chosen.iter().enumerate())
+            .map(|(position, &level)| {
+                let size = self.batch_size(levels[level].1);
                 draw(self.examples, self.config, level, size, step_seed.derive("batch", &[position as u64]))
             })
             .collect();
-        let lengths: Vec<usize> = batches.iter().map(Vec::len).collect();
+        let sizes: Vec<(usize, usize)> =
+            batches.iter().map(|parts| (parts.len(), parts.iter().map(|part| part.ends.len()).sum())).collect();
         let parts: Vec<Part> = batches.into_iter().flatten().collect();
         let (learner, losses) = learner.step(&parts, learning_rate);
         standing.step += 1;
         let mut rest = losses.as_slice();
         let mut total = 0.0;
-        for ((&level, &size), length) in chosen.iter().zip(&sizes).zip(lengths) {
-            let (of_level, after) = rest.split_at(length);
+        for (&level, (n_parts, size)) in chosen.iter().zip(sizes) {
+            let (of_level, after) = rest.split_at(n_parts);
             rest = after;
             let losses = of_level.iter().copied().fold(Losses::default(), Losses::plus);
             total += losses.total;

@@ -2,13 +2,14 @@
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::artifact;
 use crate::cli::StageArgs;
 use crate::commands::{CommandOutcome, output};
-use crate::pipeline::{self, Options, Pipeline, RunDir, Stage, StageReport, Status};
+use crate::pipeline::{self, Options, PipelineFile, RunDir, Stage, StageReport, Status};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
 pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
@@ -33,7 +34,7 @@ pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result
         let text = artifact::read(&folder.path().join("report.json"))?;
         output::print(&String::from_utf8(text)?)?;
     } else {
-        let text = artifact::read(&folder.path().join("report.txt"))?;
+        let text = artifact::read(&folder.path().join("report.md"))?;
         output::print(&String::from_utf8(text)?)?;
         output::note(&format!("{}", folder.path().join("index.html").display()));
     }
@@ -46,8 +47,8 @@ fn run_stages(
     to: Stage,
     stop: &Arc<AtomicBool>,
 ) -> anyhow::Result<(RunDir, Vec<StageReport>)> {
-    let pipeline = Pipeline::load(&args.pipeline)?;
-    let dir = RunDir::new(run_directory(args.out.as_deref(), &pipeline));
+    let file = PipelineFile::load(&args.pipeline)?;
+    let dir = RunDir::new(run_directory(args.out.as_deref(), &file));
     let options = Options {
         from,
         to,
@@ -56,15 +57,35 @@ fn run_stages(
         force: args.force,
         shard: args.shard,
         progress: true,
+        commit: commit_of(&args.pipeline),
+        experiment: None,
         stop: Arc::clone(stop),
     };
-    let reports = pipeline::run(&pipeline, &dir, &options)?;
+    let reports = match &file {
+        PipelineFile::Experiment(pipeline) => pipeline::run(pipeline, &dir, &options)?,
+        PipelineFile::Study(study) => pipeline::run_study(study, &dir, &options)?,
+    };
     Ok((dir, reports))
 }
 
+/// Of which commit a file is, if it is under version control and git is there.
+fn commit_of(file: &Path) -> Option<String> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let described = Command::new("git")
+        .arg("-C")
+        .arg(folder)
+        .args(["describe", "--always", "--dirty", "--abbrev=10", "--exclude=*"])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output()
+        .ok()?;
+    let commit = String::from_utf8(described.stdout).ok()?;
+    described.status.success().then(|| commit.trim().to_owned())
+}
+
 /// `--out`, or a folder of the pipeline's name.
-pub(super) fn run_directory(out: Option<&Path>, pipeline: &Pipeline) -> PathBuf {
-    out.map_or_else(|| Path::new("data/runs").join(&pipeline.spec.name), Path::to_owned)
+pub(super) fn run_directory(out: Option<&Path>, file: &PipelineFile) -> PathBuf {
+    out.map_or_else(|| Path::new("data/runs").join(file.name()), Path::to_owned)
 }
 
 fn all_cores() -> usize {
@@ -83,7 +104,9 @@ pub(super) fn line(report: &StageReport) -> String {
         (episodes, 0) => format!("  {episodes} episodes"),
         (episodes, failed) => format!("  {episodes} episodes, {failed} failed"),
     };
-    let name = if std::io::stdout().is_terminal() { format!("{:<36}", report.unit) } else { report.unit.clone() };
+    let experiment = report.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
+    let name = format!("{experiment}{}", report.unit);
+    let name = if std::io::stdout().is_terminal() { format!("{name:<52}") } else { name };
     format!("{name}  {what}{episodes}")
 }
 

@@ -1,62 +1,37 @@
-//! Which network a model is, and for what it was made.
-
-use std::fmt;
+//! What stands beside a model's weights: which network it is, and for what it was made.
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::flattened::{Flattened, FlattenedConfig};
-use crate::model::object_centric::{ObjectCentric, ObjectCentricConfig};
+use crate::model::flattened::FlattenedConfig;
+use crate::model::object_centric::ObjectCentricConfig;
+use crate::model::variant::{EncoderKind, Variant};
 use crate::program::vocabulary_hash;
 use crate::task::Family;
 
-/// A kind of network.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Variant {
-    /// NTP with the object-centric encoder.
-    #[default]
-    Ntp,
-    /// NTP with the paper's flattened encoder.
-    NtpPaper,
-}
-
-impl Variant {
-    /// Every variant.
-    pub const ALL: [Self; 2] = [Self::Ntp, Self::NtpPaper];
-
-    /// The name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ntp => "ntp",
-            Self::NtpPaper => "ntp_paper",
-        }
-    }
-}
-
-impl fmt::Display for Variant {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// The widths of a variant's network.
+/// The widths of a network, by its encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NetworkConfig {
-    /// Of [`Variant::Ntp`].
+    /// Of [`EncoderKind::ObjectCentric`].
     ObjectCentric(ObjectCentricConfig),
-    /// Of [`Variant::NtpPaper`].
+    /// Of [`EncoderKind::Flattened`].
     Flattened(FlattenedConfig),
 }
 
 impl NetworkConfig {
     /// A variant's default.
     pub fn of(variant: Variant) -> Self {
-        match variant {
-            Variant::Ntp => Self::ObjectCentric(ObjectCentricConfig::default()),
-            Variant::NtpPaper => Self::Flattened(FlattenedConfig::default()),
+        match variant.encoder() {
+            EncoderKind::ObjectCentric => Self::ObjectCentric(ObjectCentricConfig::default()),
+            EncoderKind::Flattened => Self::Flattened(FlattenedConfig::default()),
+        }
+    }
+
+    /// Whose widths they are.
+    pub fn encoder(&self) -> EncoderKind {
+        match self {
+            Self::ObjectCentric(_) => EncoderKind::ObjectCentric,
+            Self::Flattened(_) => EncoderKind::Flattened,
         }
     }
 }
@@ -83,7 +58,7 @@ pub struct ModelConfig {
 
 impl ModelConfig {
     /// Version of `config.json`.
-    pub const VERSION: u32 = 1;
+    pub const VERSION: u32 = 2;
 
     /// A model of a variant's default widths and the current vocabulary.
     pub fn new(variant: Variant, family: Family, n_slots: usize, training: serde_json::Value) -> Self {
@@ -97,13 +72,4 @@ impl ModelConfig {
             training,
         }
     }
-}
-
-/// A network of any variant.
-#[derive(Debug)]
-pub enum AnyNetwork {
-    /// Of [`Variant::Ntp`].
-    ObjectCentric(Box<ObjectCentric>),
-    /// Of [`Variant::NtpPaper`].
-    Flattened(Box<Flattened>),
 }

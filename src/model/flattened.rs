@@ -1,4 +1,4 @@
-//! The paper's network: an observation is one vector of all objects' positions.
+//! The paper's encoder: an observation is one vector of all objects' positions.
 //!
 //! # Source
 //!
@@ -10,16 +10,13 @@ use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
+use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{Rows, flat_width};
-use crate::model::heads::{CoreOutput, ReactiveCore, ScopeHead};
-use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, repeat_row};
-use crate::model::memory::ProgramMemory;
-use crate::model::network::{Network, Padding, Windows};
-use crate::program::Program;
-use crate::seed::Seed;
+use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
+use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
-/// Widths of the flattened network.
+/// Widths of the flattened networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlattenedConfig {
@@ -39,17 +36,19 @@ impl Default for FlattenedConfig {
     }
 }
 
-/// The network of variant `ntp_paper`.
+/// The paper's encoder.
 #[derive(Module, Debug)]
 pub struct Flattened {
     state: Mlp,
     specification: SpecificationEncoder,
-    scope: ScopeHead,
-    core: ReactiveCore,
-    memory: ProgramMemory,
-    argument: SpecificationEncoder,
-    argument_hidden: Mlp,
-    argument_slots: Linear,
+}
+
+/// The paper's argument decoder, with an encoder of its own.
+#[derive(Module, Debug)]
+pub struct FlatArgument {
+    specification: SpecificationEncoder,
+    hidden: Mlp,
+    slots: Linear,
 }
 
 /// `f_TSE`: frames embedded, convolved over time, and summed up in one vector.
@@ -84,6 +83,7 @@ impl SpecificationEncoder {
 /// Features of a demonstration.
 #[derive(Clone, Debug)]
 pub struct FlatDemonstration {
+    n_slots: usize,
     /// `[B, T, features]`
     frames: Tensor<3>,
     padding: Option<Padding>,
@@ -101,76 +101,76 @@ pub struct FlatReading {
     state: Tensor<2>,
 }
 
-impl Flattened {
-    /// A fresh network for scenes of `n_slots` slots; the same seed gives the same parameters.
-    pub fn new(config: &FlattenedConfig, n_slots: usize, seed: Seed, device: &Device) -> Self {
-        let &FlattenedConfig { width, program_width, scope_kernel, argument_kernel } = config;
-        let init = &mut Init::new(seed, device);
+impl Encoder for Flattened {
+    type Config = FlattenedConfig;
+    type Demonstration = FlatDemonstration;
+    type Reading = FlatReading;
+    type Argument = FlatArgument;
+
+    fn new(config: &FlattenedConfig, n_slots: usize, init: &mut Init) -> Self {
         let n_features = flat_width(n_slots);
-        let n_context = program_width + width;
         Self {
-            state: init.mlp(&[n_features, width, width]),
-            specification: SpecificationEncoder::new(init, n_features, width, scope_kernel),
-            scope: ScopeHead::new(init, width, n_context, width),
-            core: ReactiveCore::new(init, &[width + n_context, width, width], program_width),
-            memory: ProgramMemory::new(init, program_width),
-            argument: SpecificationEncoder::new(init, n_features, width, argument_kernel),
-            argument_hidden: init.mlp(&[width + n_context, width]),
-            argument_slots: init.linear(width, n_slots),
+            state: init.mlp(&[n_features, config.width, config.width]),
+            specification: SpecificationEncoder::new(init, n_features, config.width, config.scope_kernel),
         }
     }
 
-    /// Program and state side by side, `[B, program + H]`.
-    fn program_and_state(&self, reading: &FlatReading, program: Program) -> Tensor<2> {
-        let state = reading.state.clone();
-        let program = repeat_row(self.memory.embedding(program), state.dims()[0]);
-        Tensor::cat(vec![program, state], 1)
+    fn widths(config: &FlattenedConfig) -> Widths {
+        let &FlattenedConfig { width, program_width, .. } = config;
+        Widths { context: width, state: width, frame: width, program: program_width, core: vec![width, width] }
     }
-}
-
-impl Network for Flattened {
-    type Demonstration = FlatDemonstration;
-    type Reading = FlatReading;
 
     fn demonstration(&self, windows: &Windows) -> FlatDemonstration {
         let device = self.device();
         let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots())];
         let frames = Tensor::from_data(TensorData::new(windows.rows().flat(), shape), &device);
-        FlatDemonstration { frames, padding: windows.padding(&device) }
+        FlatDemonstration { n_slots: windows.n_slots(), frames, padding: windows.padding(&device) }
     }
 
     fn window(demonstration: &FlatDemonstration, span: Span) -> FlatDemonstration {
         let frames = demonstration.frames.clone().narrow(1, span.begin as usize, span.len());
-        FlatDemonstration { frames, padding: None }
+        FlatDemonstration { n_slots: demonstration.n_slots, frames, padding: None }
     }
 
     fn read(&self, demonstration: &FlatDemonstration, states: &[f32]) -> FlatReading {
-        let n_slots = self.argument_slots.weight.dims()[1];
-        let states = Rows { n_slots, values: states }.flat();
-        let shape = [demonstration.frames.dims()[0], flat_width(n_slots)];
+        let FlatDemonstration { n_slots, frames, padding } = demonstration;
+        let states = Rows { n_slots: *n_slots, values: states }.flat();
+        let shape = [frames.dims()[0], flat_width(*n_slots)];
         let states = Tensor::<2>::from_data(TensorData::new(states, shape), &self.device());
-        let (convolved, summary) =
-            self.specification.forward(demonstration.frames.clone(), demonstration.padding.as_ref());
+        let (convolved, summary) = self.specification.forward(frames.clone(), padding.as_ref());
         FlatReading { demonstration: demonstration.clone(), convolved, summary, state: self.state.forward(states) }
     }
 
-    fn core(&self, reading: &FlatReading, program: Program) -> CoreOutput {
-        let input = Tensor::cat(vec![reading.summary.clone(), self.program_and_state(reading, program)], 1);
-        self.core.forward(input, &self.memory)
+    fn context(reading: &FlatReading) -> Tensor<2> {
+        reading.summary.clone()
     }
 
-    fn scope(&self, reading: &FlatReading, program: Program) -> Tensor<3> {
-        self.scope.forward(reading.convolved.clone(), self.program_and_state(reading, program))
+    fn state(reading: &FlatReading) -> Tensor<2> {
+        reading.state.clone()
     }
 
-    fn argument(&self, reading: &FlatReading, program: Program, _core: &CoreOutput) -> Tensor<2> {
-        let FlatDemonstration { frames, padding } = &reading.demonstration;
-        let (_, summary) = self.argument.forward(frames.clone(), padding.as_ref());
-        let input = Tensor::cat(vec![summary, self.program_and_state(reading, program)], 1);
-        self.argument_slots.forward(self.argument_hidden.forward(input))
+    fn frames(reading: &FlatReading) -> Tensor<3> {
+        reading.convolved.clone()
     }
 
     fn device(&self) -> Device {
-        self.argument_slots.weight.device()
+        self.specification.conv.device()
+    }
+}
+
+impl ArgumentDecoder<Flattened> for FlatArgument {
+    fn new(config: &FlattenedConfig, n_slots: usize, n_view: usize, init: &mut Init) -> Self {
+        let &FlattenedConfig { width, program_width, argument_kernel, .. } = config;
+        Self {
+            specification: SpecificationEncoder::new(init, flat_width(n_slots), width, argument_kernel),
+            hidden: init.mlp(&[width + program_width + n_view, width]),
+            slots: init.linear(width, n_slots),
+        }
+    }
+
+    fn forward(&self, reading: &FlatReading, program: Tensor<2>, view: Tensor<2>, _hidden: Tensor<2>) -> Tensor<2> {
+        let FlatDemonstration { frames, padding, .. } = &reading.demonstration;
+        let (_, summary) = self.specification.forward(frames.clone(), padding.as_ref());
+        self.slots.forward(self.hidden.forward(Tensor::cat(vec![summary, program, view], 1)))
     }
 }

@@ -15,7 +15,7 @@ use crate::seed::Seed;
 
 /// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
 /// another process.
-pub(crate) struct Init {
+pub struct Init {
     rng: ChaCha8Rng,
     next_id: u64,
     device: Device,
@@ -53,6 +53,11 @@ impl Init {
         Mlp { layers: widths.windows(2).map(|pair| self.linear(pair[0], pair[1])).collect() }
     }
 
+    /// The same with the inputs' width beside the layers'.
+    pub(crate) fn mlp_from(&mut self, n_inputs: usize, widths: &[usize]) -> Mlp {
+        self.mlp(&[&[n_inputs], widths].concat())
+    }
+
     pub(crate) fn temporal_conv(&mut self, kernel: usize, n_inputs: usize, n_outputs: usize) -> TemporalConv {
         TemporalConv { kernel, linear: self.linear(kernel * n_inputs, n_outputs) }
     }
@@ -82,6 +87,10 @@ pub(crate) struct TemporalConv {
 }
 
 impl TemporalConv {
+    pub(crate) fn device(&self) -> Device {
+        self.linear.weight.device()
+    }
+
     /// # Shapes
     ///
     /// `[B, T, ..., n_inputs]` → `[B, T, ..., n_outputs]`

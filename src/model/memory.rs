@@ -6,9 +6,11 @@
 //! [`Program::None`] besides, which the paper has not: a program can end without a last call.
 
 use burn::module::{Module, Param};
+use burn::nn::Linear;
 use burn::tensor::Tensor;
 
 use crate::model::layers::Init;
+use crate::model::network::CoreOutput;
 use crate::program::Program;
 
 /// Embeddings of programs, and the keys they are found by.
@@ -47,5 +49,17 @@ impl ProgramMemory {
     /// `[B, key]` → `[B, programs]`
     pub fn address(&self, key: Tensor<2>) -> Tensor<2> {
         key.matmul(self.keys.val().transpose())
+    }
+
+    /// The core's decision from its hidden vector: `key_and_end` gives the key and, behind it, the end.
+    ///
+    /// # Shapes
+    ///
+    /// `[B, hidden]`
+    pub(crate) fn decide(&self, key_and_end: &Linear, hidden: Tensor<2>) -> CoreOutput {
+        let output = key_and_end.forward(hidden.clone());
+        let n_key = output.dims()[1] - 1;
+        let programs = self.address(output.clone().narrow(1, 0, n_key));
+        CoreOutput { programs, end: output.narrow(1, n_key, 1), hidden }
     }
 }

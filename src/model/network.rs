@@ -1,126 +1,46 @@
-//! What training and the learned policy ask of a variant's network, and the windows it reads.
+//! What training and the learned policy ask of a variant's network.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
-use crate::model::features::Rows;
-use crate::model::heads::CoreOutput;
+use crate::model::decisions::Decisions;
+use crate::model::windows::Windows;
 use crate::program::Program;
-use crate::trace::{Observation, Span};
+use crate::trace::Span;
 
-/// A batch of specification windows, padded at their ends to the longest.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Windows {
-    n_slots: usize,
-    n_frames: usize,
-    lengths: Vec<usize>,
-    rows: Vec<f32>,
-}
-
-impl Windows {
-    /// Stacks windows, each of observation rows of `n_slots` slots.
-    pub fn new(n_slots: usize, windows: &[&[f32]]) -> Self {
-        let width = Observation::width(n_slots);
-        let lengths: Vec<usize> = windows.iter().map(|window| window.len() / width).collect();
-        let n_frames = lengths.iter().copied().max().unwrap_or(0);
-        let mut rows = vec![0.0; windows.len() * n_frames * width];
-        for (window, padded) in windows.iter().zip(rows.chunks_exact_mut((n_frames * width).max(1))) {
-            padded[..window.len()].copy_from_slice(window);
-        }
-        Self { n_slots, n_frames, lengths, rows }
-    }
-
-    /// How many windows.
-    pub fn n_windows(&self) -> usize {
-        self.lengths.len()
-    }
-
-    /// Frames of the longest window.
-    pub fn n_frames(&self) -> usize {
-        self.n_frames
-    }
-
-    /// Slots of each observation.
-    pub fn n_slots(&self) -> usize {
-        self.n_slots
-    }
-
-    pub(crate) fn rows(&self) -> Rows<'_> {
-        Rows { n_slots: self.n_slots, values: &self.rows }
-    }
-
-    /// The masks; nothing when no window is padded.
-    pub(crate) fn padding(&self, device: &Device) -> Option<Padding> {
-        let padded = self.lengths.iter().any(|&length| length != self.n_frames);
-        padded.then(|| {
-            let column = |wanted: fn(usize, usize) -> bool| {
-                let frames = self.lengths.iter().flat_map(|&length| (0..self.n_frames).map(move |t| (t, length)));
-                let values: Vec<f32> = frames.map(|(t, length)| f32::from(u8::from(wanted(t, length)))).collect();
-                Tensor::from_data(TensorData::new(values, [self.n_windows(), self.n_frames, 1]), device)
-            };
-            Padding { valid: column(|t, length| t < length), last: column(|t, length| t + 1 == length) }
-        })
-    }
-}
-
-/// Which frames of padded windows count.
+/// What the core decides.
 #[derive(Clone, Debug)]
-pub(crate) struct Padding {
-    /// One within the window, `[B, T, 1]`.
-    valid: Tensor<3>,
-    /// One at the window's last frame, `[B, T, 1]`.
-    last: Tensor<3>,
-}
-
-impl Padding {
-    /// Zero beyond the window.
-    pub(crate) fn mask(padding: Option<&Self>, frames: Tensor<3>) -> Tensor<3> {
-        match padding {
-            Some(padding) => frames * padding.valid.clone(),
-            None => frames,
-        }
-    }
-
-    /// Zero beyond the window; objects have a dimension of their own.
-    pub(crate) fn mask_objects(padding: Option<&Self>, objects: Tensor<4>) -> Tensor<4> {
-        match padding {
-            Some(padding) => objects * padding.valid.clone().unsqueeze_dim(3),
-            None => objects,
-        }
-    }
-
-    /// The window's last frame: `[B, T, H]` → `[B, H]`.
-    pub(crate) fn last_frame(padding: Option<&Self>, frames: Tensor<3>) -> Tensor<2> {
-        match padding {
-            Some(padding) => (frames * padding.last.clone()).sum_dim(1).squeeze_dim(1),
-            None => {
-                let n_frames = frames.dims()[1];
-                frames.narrow(1, n_frames - 1, 1).squeeze_dim(1)
-            }
-        }
-    }
-
-    /// The window's last frame: `[B, T, N, H]` → `[B, N, H]`.
-    pub(crate) fn last_objects(padding: Option<&Self>, objects: Tensor<4>) -> Tensor<3> {
-        match padding {
-            Some(padding) => (objects * padding.last.clone().unsqueeze_dim(3)).sum_dim(1).squeeze_dim(1),
-            None => {
-                let n_frames = objects.dims()[1];
-                objects.narrow(1, n_frames - 1, 1).squeeze_dim(1)
-            }
-        }
-    }
+pub struct CoreOutput {
+    /// Logits of the next program, `[B, programs]`.
+    pub programs: Tensor<2>,
+    /// Logit of the end of the running program, `[B, 1]`.
+    pub end: Tensor<2>,
+    /// What it decided from, `[B, hidden]`.
+    pub hidden: Tensor<2>,
 }
 
 /// A variant's network.
 ///
 /// A decision goes through four steps: what depends on the demonstration alone, then the reading of demonstration and
 /// state together, the core's decision, and of scope and argument the one that the decision needs.
+///
+/// # Shapes
+///
+/// A batch holds the steps of one or more calls, packed: first the first step of every call, then the second of those
+/// that have one, and so on; calls with more steps come first. `steps` says how many calls have each step, so it sums
+/// to `B`. For a network without memory `[B]` will do.
 pub trait Network: Module + Sync + 'static {
+    /// What is decided.
+    const DECISIONS: Decisions;
+    /// Whether a decision depends on the steps before it in the same call.
+    const IS_RECURRENT: bool;
+
     /// What is computed of a demonstration before any state is seen. The policy keeps it for the whole episode.
     type Demonstration: Clone + Send + Sync;
     /// Demonstration and state, encoded.
     type Reading;
+    /// What a running call remembers from one step to the next.
+    type Recall: Clone + Send + Sync;
 
     /// The part that does not depend on the state: of every frame by itself, so that windows can be cut from it.
     fn demonstration(&self, windows: &Windows) -> Self::Demonstration;
@@ -131,11 +51,18 @@ pub trait Network: Module + Sync + 'static {
     /// Encodes the demonstration and the state beside it. `states` are observation rows, one a window.
     fn read(&self, demonstration: &Self::Demonstration, states: &[f32]) -> Self::Reading;
 
-    /// The next program and the end of the running one.
-    fn core(&self, reading: &Self::Reading, program: Program) -> CoreOutput;
+    /// The next program and the end of the running one; and what the calls of the last step remember. A call's first
+    /// step remembers nothing.
+    fn core(
+        &self,
+        reading: &Self::Reading,
+        program: Program,
+        steps: &[usize],
+        recall: Option<Self::Recall>,
+    ) -> (CoreOutput, Self::Recall);
 
-    /// Logits of the scoping labels, `[B, T, 4]`; arbitrary beyond a window.
-    fn scope(&self, reading: &Self::Reading, program: Program) -> Tensor<3>;
+    /// Logits of the scoping labels, `[B, T, 4]`, arbitrary beyond a window; nothing where none are decided.
+    fn scope(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>>;
 
     /// Logits of the argument over the slots, `[B, N]`.
     fn argument(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Tensor<2>;

@@ -1,4 +1,4 @@
-//! The object-centric network: every slot of every demonstrated frame is compared with the same slot now.
+//! The object-centric encoder: every slot of every demonstrated frame is compared with the same slot now.
 //!
 //! ```text
 //! for each pair (i, k) of slots: displacement in the frame, displacement now ─► max over k ─► e_ji
@@ -22,16 +22,13 @@ use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
+use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
-use crate::model::heads::{CoreOutput, ReactiveCore, ScopeHead};
-use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, repeat_row};
-use crate::model::memory::ProgramMemory;
-use crate::model::network::{Network, Padding, Windows};
-use crate::program::Program;
-use crate::seed::Seed;
+use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
+use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
-/// Widths of the object-centric network.
+/// Widths of the object-centric networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectCentricConfig {
@@ -53,7 +50,7 @@ impl Default for ObjectCentricConfig {
     }
 }
 
-/// The network of variant `ntp`.
+/// The object-centric encoder.
 #[derive(Module, Debug)]
 pub struct ObjectCentric {
     pair_demonstration: Linear,
@@ -65,13 +62,15 @@ pub struct ObjectCentric {
     object: Linear,
     state: Mlp,
     scope_conv: TemporalConv,
-    scope: ScopeHead,
-    core: ReactiveCore,
-    memory: ProgramMemory,
-    pointer_conv: TemporalConv,
-    pointer_object: Linear,
-    pointer_context: Linear,
-    pointer: Linear,
+}
+
+/// Points at a slot by what the specification and the state show of it.
+#[derive(Module, Debug)]
+pub struct Pointer {
+    conv: TemporalConv,
+    object: Linear,
+    context: Linear,
+    slot: Linear,
 }
 
 /// First layers of pairs and slots, for the demonstration alone.
@@ -99,42 +98,6 @@ pub struct ObjectReading {
 }
 
 impl ObjectCentric {
-    /// A fresh network; the same seed gives the same parameters.
-    pub fn new(config: &ObjectCentricConfig, seed: Seed, device: &Device) -> Self {
-        let &ObjectCentricConfig { pair_width, width, program_width, scope_kernel, argument_kernel } = config;
-        let init = &mut Init::new(seed, device);
-        let n_pair = 2 * POSITION_WIDTH;
-        let n_object = pair_width + 2 * OBJECT_WIDTH;
-        let n_state = width + AGENT_WIDTH;
-        let n_context = n_state + program_width;
-        let n_pointer = 2 * width + program_width + width;
-        Self {
-            pair_demonstration: init.part(POSITION_WIDTH, pair_width, n_pair),
-            pair_state: init.linear(POSITION_WIDTH, pair_width),
-            pair: init.linear(pair_width, pair_width),
-            object_pairs: init.part(pair_width, width, n_object),
-            object_demonstration: init.part(OBJECT_WIDTH, width, n_object),
-            object_state: init.linear(OBJECT_WIDTH, width),
-            object: init.linear(width, width),
-            state: init.mlp(&[OBJECT_WIDTH, width, width]),
-            scope_conv: init.temporal_conv(scope_kernel, width, width),
-            scope: ScopeHead::new(init, 2 * width, n_context, width),
-            core: ReactiveCore::new(init, &[2 * width + n_context, width], program_width),
-            memory: ProgramMemory::new(init, program_width),
-            pointer_conv: init.temporal_conv(argument_kernel, width, width),
-            pointer_object: init.part(2 * width, width, n_pointer),
-            pointer_context: init.linear(program_width + width, width),
-            pointer: init.linear(width, 1),
-        }
-    }
-
-    /// Program and state side by side, `[B, program + state]`.
-    fn program_and_state(&self, reading: &ObjectReading, program: Program) -> Tensor<2> {
-        let state = reading.state.clone();
-        let program = repeat_row(self.memory.embedding(program), state.dims()[0]);
-        Tensor::cat(vec![program, state], 1)
-    }
-
     /// Each slot in each frame, compared with its pairs and itself now: `[B, T, N, H]`.
     fn compare(&self, demonstration: &ObjectDemonstration, states: Rows<'_>) -> Tensor<4> {
         let device = self.device();
@@ -153,9 +116,34 @@ impl ObjectCentric {
     }
 }
 
-impl Network for ObjectCentric {
+impl Encoder for ObjectCentric {
+    type Config = ObjectCentricConfig;
     type Demonstration = ObjectDemonstration;
     type Reading = ObjectReading;
+    type Argument = Pointer;
+
+    fn new(config: &ObjectCentricConfig, _n_slots: usize, init: &mut Init) -> Self {
+        let &ObjectCentricConfig { pair_width, width, scope_kernel, .. } = config;
+        let n_pair = 2 * POSITION_WIDTH;
+        let n_object = pair_width + 2 * OBJECT_WIDTH;
+        Self {
+            pair_demonstration: init.part(POSITION_WIDTH, pair_width, n_pair),
+            pair_state: init.linear(POSITION_WIDTH, pair_width),
+            pair: init.linear(pair_width, pair_width),
+            object_pairs: init.part(pair_width, width, n_object),
+            object_demonstration: init.part(OBJECT_WIDTH, width, n_object),
+            object_state: init.linear(OBJECT_WIDTH, width),
+            object: init.linear(width, width),
+            state: init.mlp(&[OBJECT_WIDTH, width, width]),
+            scope_conv: init.temporal_conv(scope_kernel, width, width),
+        }
+    }
+
+    fn widths(config: &ObjectCentricConfig) -> Widths {
+        let &ObjectCentricConfig { width, program_width, .. } = config;
+        let (context, frame) = (2 * width, 2 * width);
+        Widths { context, state: width + AGENT_WIDTH, frame, program: program_width, core: vec![width] }
+    }
 
     fn demonstration(&self, windows: &Windows) -> ObjectDemonstration {
         let device = self.device();
@@ -196,32 +184,47 @@ impl Network for ObjectCentric {
         }
     }
 
-    fn core(&self, reading: &ObjectReading, program: Program) -> CoreOutput {
-        let input = Tensor::cat(vec![reading.context.clone(), self.program_and_state(reading, program)], 1);
-        self.core.forward(input, &self.memory)
+    fn context(reading: &ObjectReading) -> Tensor<2> {
+        reading.context.clone()
     }
 
-    fn scope(&self, reading: &ObjectReading, program: Program) -> Tensor<3> {
+    fn state(reading: &ObjectReading) -> Tensor<2> {
+        reading.state.clone()
+    }
+
+    /// Each frame, and the most of what came before it, which tells whether a segment that is still to do lies there.
+    fn frames(reading: &ObjectReading) -> Tensor<3> {
         let frames = reading.frames.clone();
         let [n_batch, n_frames, width] = frames.dims();
-        // What came before a frame tells whether a segment that is still to do lies before it.
         let first = Tensor::zeros([n_batch, 1, width], &frames.device());
         let before = Tensor::cat(vec![first, frames.clone()], 1).narrow(1, 0, n_frames).cummax(1);
-        self.scope.forward(Tensor::cat(vec![frames, before], 2), self.program_and_state(reading, program))
-    }
-
-    fn argument(&self, reading: &ObjectReading, program: Program, core: &CoreOutput) -> Tensor<2> {
-        let padding = reading.padding.as_ref();
-        let objects = Padding::mask_objects(padding, reading.objects.clone());
-        let last = Padding::last_objects(padding, objects.clone());
-        let moving = Padding::mask_objects(padding, self.pointer_conv.forward(objects)).max_dim(1).squeeze_dim(1);
-        let program = repeat_row(self.memory.embedding(program), core.hidden.dims()[0]);
-        let context = self.pointer_context.forward(Tensor::cat(vec![program, core.hidden.clone()], 1));
-        let object = self.pointer_object.forward(Tensor::<3>::cat(vec![moving, last], 2));
-        self.pointer.forward(relu(object + context.unsqueeze_dim(1))).squeeze_dim(2)
+        Tensor::cat(vec![frames, before], 2)
     }
 
     fn device(&self) -> Device {
         self.pair.weight.device()
+    }
+}
+
+impl ArgumentDecoder<ObjectCentric> for Pointer {
+    fn new(config: &ObjectCentricConfig, _n_slots: usize, _n_view: usize, init: &mut Init) -> Self {
+        let &ObjectCentricConfig { width, program_width, argument_kernel, .. } = config;
+        let n_context = program_width + width;
+        Self {
+            conv: init.temporal_conv(argument_kernel, width, width),
+            object: init.part(2 * width, width, 2 * width + n_context),
+            context: init.linear(n_context, width),
+            slot: init.linear(width, 1),
+        }
+    }
+
+    fn forward(&self, reading: &ObjectReading, program: Tensor<2>, _view: Tensor<2>, hidden: Tensor<2>) -> Tensor<2> {
+        let padding = reading.padding.as_ref();
+        let objects = Padding::mask_objects(padding, reading.objects.clone());
+        let last = Padding::last_objects(padding, objects.clone());
+        let moving = Padding::mask_objects(padding, self.conv.forward(objects)).max_dim(1).squeeze_dim(1);
+        let context = self.context.forward(Tensor::cat(vec![program, hidden], 1));
+        let object = self.object.forward(Tensor::<3>::cat(vec![moving, last], 2));
+        self.slot.forward(relu(object + context.unsqueeze_dim(1))).squeeze_dim(2)
     }
 }

@@ -13,9 +13,10 @@ use burn::tensor::Device;
 use serde::Serialize;
 
 use crate::artifact::{self, IoError};
-use crate::model::config::{AnyNetwork, ModelConfig, NetworkConfig, Variant};
-use crate::model::flattened::Flattened;
-use crate::model::object_centric::ObjectCentric;
+use crate::model::build::{NetworkUse, with_network};
+use crate::model::config::ModelConfig;
+use crate::model::network::Network;
+use crate::model::variant::Variant;
 use crate::program::vocabulary_hash;
 use crate::seed::Seed;
 
@@ -120,9 +121,8 @@ pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
     if config.vocabulary != expected {
         return Err(ModelError::Vocabulary { found: config.vocabulary, expected, path });
     }
-    match (config.variant, config.network) {
-        (Variant::Ntp, NetworkConfig::ObjectCentric(_)) | (Variant::NtpPaper, NetworkConfig::Flattened(_)) => {}
-        (variant, _) => return Err(ModelError::Network { variant, path }),
+    if config.variant.encoder() != config.network.encoder() {
+        return Err(ModelError::Network { variant: config.variant, path });
     }
     Ok(config)
 }
@@ -146,27 +146,30 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
     }
 }
 
-/// Loads a trained model for inference.
+/// Loads a trained model for inference and hands its network on.
 ///
 /// # Errors
 ///
 /// As [`load_config`], and when the weights do not fit.
-pub fn load(folder: &Path) -> Result<(ModelConfig, AnyNetwork), ModelError> {
-    let config = load_config(folder)?;
+pub fn load<U: NetworkUse>(folder: &Path, config: &ModelConfig, wanted: U) -> Result<U::Output, ModelError> {
     let path = folder.join(WEIGHTS_FILE);
     let bytes = artifact::read(&path)?;
-    let device = Device::flex();
-    let network = match config.network {
-        NetworkConfig::ObjectCentric(widths) => {
-            let network = ObjectCentric::new(&widths, Seed(0), &device);
-            AnyNetwork::ObjectCentric(Box::new(weights_from_bytes(network, bytes, &path)?))
-        }
-        NetworkConfig::Flattened(widths) => {
-            let network = Flattened::new(&widths, config.n_slots, Seed(0), &device);
-            AnyNetwork::Flattened(Box::new(weights_from_bytes(network, bytes, &path)?))
-        }
-    };
-    Ok((config, network))
+    with_network(config, Seed(0), &Device::flex(), Loading { bytes, path: &path, wanted })
+}
+
+/// Gives a network its stored weights before it is used.
+struct Loading<'l, U> {
+    bytes: Vec<u8>,
+    path: &'l Path,
+    wanted: U,
+}
+
+impl<U: NetworkUse> NetworkUse for Loading<'_, U> {
+    type Output = Result<U::Output, ModelError>;
+
+    fn run<N: Network>(self, network: N) -> Self::Output {
+        Ok(self.wanted.run(weights_from_bytes(network, self.bytes, self.path)?))
+    }
 }
 
 /// What `ntp inspect` says of a model.
@@ -184,10 +187,17 @@ pub struct ModelSummary {
 ///
 /// As [`load`].
 pub fn inspect(folder: &Path) -> Result<ModelSummary, ModelError> {
-    let (config, network) = load(folder)?;
-    let parameters = match network {
-        AnyNetwork::ObjectCentric(network) => network.num_params(),
-        AnyNetwork::Flattened(network) => network.num_params(),
-    };
-    Ok(ModelSummary { parameters, config })
+    let config = load_config(folder)?;
+    Ok(ModelSummary { parameters: load(folder, &config, Parameters)?, config })
+}
+
+/// How many numbers were learned.
+struct Parameters;
+
+impl NetworkUse for Parameters {
+    type Output = usize;
+
+    fn run<N: Network>(self, network: N) -> usize {
+        network.num_params()
+    }
 }

@@ -23,6 +23,11 @@ impl RunDir {
         &self.root
     }
 
+    /// The run directory of an experiment of a study.
+    pub fn experiment(&self, name: &str) -> Self {
+        Self { root: self.root.join(name) }
+    }
+
     fn stage(&self, stage: Stage, folder: &str) -> StageDir {
         StageDir::new(stage.name(), self.root.join(folder))
     }
@@ -47,9 +52,9 @@ impl RunDir {
         self.stage(Stage::Train, &format!("models/{name}"))
     }
 
-    /// `rollouts/<model>/<suite>/`.
-    pub fn rollouts(&self, model: &str, suite: &str) -> StageDir {
-        self.stage(Stage::Rollout, &format!("rollouts/{model}/{suite}"))
+    /// `rollouts/<model>-<decoder>/<suite>/`, or `rollouts/oracle/<suite>/`.
+    pub fn rollouts(&self, actor: &str, suite: &str) -> StageDir {
+        self.stage(Stage::Rollout, &format!("rollouts/{actor}/{suite}"))
     }
 
     /// `report/`.

@@ -1,44 +1,71 @@
-//! Stage `report`: everything that was rolled out and trained, on one page.
+//! Stage `report`: everything that was rolled out and trained, on one page; of one experiment, or of all of a study.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 use serde_json::json;
 
 use crate::artifact::{FileEntry, IoError, Plan, Receipt};
 use crate::model;
-use crate::pipeline::layout::model_name;
-use crate::pipeline::runner::{Context, Part, Unit};
-use crate::pipeline::{PipelineError, Stage, rollout, tasks};
-use crate::report::{self, Fact, MetricsInput, ReportInputs, paper_values};
+use crate::pipeline::costs::Costs;
+use crate::pipeline::runner::{Context, Options, Part, Unit};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout, tasks, train};
+use crate::report::{self, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values};
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
-const FILES: [&str; 4] = ["report.json", "results.csv", "curves.csv", "index.html"];
+/// What a report holds.
+const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
+/// Version of what a report says, beside that of the program.
+const VERSION: u32 = 2;
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let mut inputs = BTreeMap::new();
     for unit in rollout::units(context)? {
         inputs.insert(unit.name.clone(), unit.dir.version()?);
     }
-    let title = title(context);
-    let plan = Plan::new(Stage::Report.name(), 1, inputs, json!({ "title": title }));
-    Ok(vec![Unit { name: "report".to_owned(), dir: context.dir.report(), plan, part: Part::Whole }])
-}
-
-fn title(context: &Context<'_>) -> String {
-    let spec = &context.pipeline.spec;
-    spec.report.title.clone().unwrap_or_else(|| spec.name.clone())
+    Ok(vec![unit(title(context.pipeline), context.dir, inputs)])
 }
 
 pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let inputs = ReportInputs {
-        title: title(context),
-        rollouts: rollout_tables(context)?,
-        metrics: metrics(context),
-        facts: facts(context)?,
-        paper: paper_values(),
-    };
+    let mut inputs = ReportInputs { title: title(context.pipeline).to_owned(), ..ReportInputs::default() };
+    gather(context, &mut inputs)?;
+    write(unit, inputs)
+}
+
+/// The one unit of a study's own report.
+pub(super) fn study_units(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<Unit>, PipelineError> {
+    let mut inputs = BTreeMap::new();
+    for pipeline in &study.experiments {
+        let context = Context { pipeline, dir: &dir.experiment(&pipeline.spec.name), options };
+        for unit in rollout::units(&context)? {
+            inputs.insert(format!("{}: {}", pipeline.spec.name, unit.name), unit.dir.version()?);
+        }
+    }
+    Ok(vec![unit(study.title(), dir, inputs)])
+}
+
+pub(super) fn work_study(study: &Study, dir: &RunDir, options: &Options, unit: &Unit) -> Result<(), PipelineError> {
+    let mut inputs = ReportInputs { title: study.title().to_owned(), ..ReportInputs::default() };
+    for pipeline in &study.experiments {
+        let dir = dir.experiment(&pipeline.spec.name);
+        gather(&Context { pipeline, dir: &dir, options }, &mut inputs)?;
+    }
+    write(unit, inputs)
+}
+
+fn title(pipeline: &Pipeline) -> &str {
+    pipeline.spec.report.title.as_deref().unwrap_or(&pipeline.spec.name)
+}
+
+fn unit(title: &str, dir: &RunDir, inputs: BTreeMap<String, String>) -> Unit {
+    let plan = Plan::new(Stage::Report.name(), 1, inputs, json!({ "title": title, "version": VERSION }));
+    Unit { name: Stage::Report.name().to_owned(), dir: dir.report(), plan, part: Part::Whole }
+}
+
+fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
+    inputs.paper = paper_values();
+    inputs.commits.sort();
+    inputs.commits.dedup();
     unit.dir.begin(&unit.plan)?;
     report::make(&inputs, unit.dir.path())?;
     let entries: Result<Vec<FileEntry>, IoError> =
@@ -48,42 +75,76 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     Ok(())
 }
 
-fn rollout_tables(context: &Context<'_>) -> Result<Vec<PathBuf>, PipelineError> {
-    let units = rollout::units(context)?;
-    Ok(units.into_iter().map(|unit| unit.dir.path().join(rollout::TABLE)).collect())
+/// Adds all that is known of one experiment.
+fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
+    let experiment = &context.pipeline.spec.name;
+    let rollouts = rollout::units(context)?;
+    let paths = rollouts.iter().map(|unit| unit.dir.path().join(rollout::TABLE));
+    inputs.rollouts.extend(paths.map(|path| RolloutsInput { experiment: experiment.clone(), path }));
+    let costs = Costs::read(context.dir)?;
+    inputs.metrics.extend(trainings(context, &costs)?);
+    inputs.facts.extend(facts(context)?);
+    inputs.costs.extend(stage_costs(context, &costs, &mut inputs.commits)?);
+    Ok(())
 }
 
-fn metrics(context: &Context<'_>) -> Vec<MetricsInput> {
-    let models = context.pipeline.spec.models.iter();
-    let of_model = |spec: &crate::pipeline::ModelSpec, seed: u64| MetricsInput {
-        variant: spec.variant.name().to_owned(),
-        seed: seed as i64,
-        path: context.dir.model(&model_name(spec.variant, spec.train_tasks, seed)).path().join(METRICS_FILE),
-    };
-    models.flat_map(|spec| spec.seeds.iter().map(move |&seed| of_model(spec, seed))).collect()
+fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
+    let (task_set, _) = tasks::read(context)?;
+    let n_seen = task_set.of_split(Split::Seen).count() as u32;
+    let mut trainings = Vec::new();
+    for unit in train::units(context)? {
+        let Part::Model { model, seed } = unit.part else { continue };
+        let spec = &context.pipeline.spec.models[model];
+        let model = ModelSummary {
+            experiment: context.pipeline.spec.name.clone(),
+            variant: spec.variant.name().to_owned(),
+            train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
+            seed: seed as i64,
+            parameters: model::inspect(unit.dir.path())?.parameters as u64,
+            cpu_secs: costs.of(&unit.name, &unit.plan).map(|cost| cost.cpu_secs),
+        };
+        trainings.push(MetricsInput { model, path: unit.dir.path().join(METRICS_FILE) });
+    }
+    Ok(trainings)
 }
 
-/// What a reader wants to know of the run beside its results.
+/// What the stages before the report took, as far as it was measured under the plans that hold now.
+fn stage_costs(
+    context: &Context<'_>,
+    costs: &Costs,
+    commits: &mut Vec<String>,
+) -> Result<Vec<StageCost>, PipelineError> {
+    let mut told = Vec::new();
+    for stage in Stage::ALL.into_iter().filter(|&stage| stage != Stage::Report) {
+        let units = super::runner::units(context, stage)?;
+        let known: Vec<_> = units.iter().filter_map(|unit| costs.of(&unit.name, &unit.plan)).collect();
+        if known.is_empty() {
+            continue;
+        }
+        commits.extend(known.iter().filter_map(|cost| cost.commit.clone()));
+        told.push(StageCost {
+            experiment: context.pipeline.spec.name.clone(),
+            stage: stage.name().to_owned(),
+            cpu_secs: known.iter().map(|cost| cost.cpu_secs).sum(),
+            wall_secs: known.iter().map(|cost| cost.wall_secs).sum(),
+        });
+    }
+    Ok(told)
+}
+
+/// What a reader wants to know of an experiment beside its results.
 fn facts(context: &Context<'_>) -> Result<Vec<Fact>, PipelineError> {
     let spec = &context.pipeline.spec;
     let (task_set, _) = tasks::read(context)?;
     let recordings = context.dir.recordings().finished()?;
     let dataset = context.dir.dataset().finished()?;
-    let fact = |name: &str, value: String| Fact { name: name.to_owned(), value };
-    let mut facts = vec![
-        fact("ntp", env!("CARGO_PKG_VERSION").to_owned()),
-        fact("pipeline", spec.name.clone()),
+    let fact = |name: &str, value: String| Fact { experiment: spec.name.clone(), name: name.to_owned(), value };
+    Ok(vec![
         fact("run seed", spec.seed.to_string()),
         fact("task family", spec.tasks.family.name().to_owned()),
         fact("training tasks", task_set.of_split(Split::Seen).count().to_string()),
         fact("unseen tasks", task_set.of_split(Split::Unseen).count().to_string()),
         fact("expert demonstrations", format!("{}, {} failed", recordings.episodes, recordings.failed)),
         fact("episodes in the dataset", dataset.episodes.to_string()),
-    ];
-    for model in &spec.models {
-        let name = model_name(model.variant, model.train_tasks, model.seeds[0]);
-        let parameters = model::inspect(context.dir.model(&name).path())?.parameters;
-        facts.push(fact(&format!("parameters of {}", model.variant.name()), parameters.to_string()));
-    }
-    Ok(facts)
+    ])
 }

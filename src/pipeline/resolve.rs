@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::de::DeserializeOwned;
+
 use crate::artifact;
+use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
-use crate::pipeline::{CountsSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::pipeline::{CountsSpec, ModelSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::task::{Family, MAX_INSTANCES, Split};
 
 /// A checked pipeline.
@@ -28,11 +31,7 @@ impl Pipeline {
     /// [`PipelineError::Syntax`] or [`PipelineError::Value`], which name file, key and what is allowed; an I/O error
     /// when the file is not there.
     pub fn load(path: &Path) -> Result<Self, PipelineError> {
-        let syntax = |message: String| PipelineError::Syntax { path: path.to_owned(), message };
-        let bytes = std::fs::read(path).map_err(|error| syntax(format!("cannot be read: {error}")))?;
-        let text = String::from_utf8(bytes).map_err(|error| syntax(format!("is not UTF-8: {error}")))?;
-        let spec: PipelineSpec = toml::from_str(&text).map_err(|error| syntax(format!("\n{error}")))?;
-        let pipeline = Self { path: path.to_owned(), spec };
+        let pipeline = Self { path: path.to_owned(), spec: parse(path)? };
         pipeline.check()?;
         Ok(pipeline)
     }
@@ -66,7 +65,7 @@ impl Pipeline {
     }
 
     fn check(&self) -> Result<(), PipelineError> {
-        self.check_name("name", &self.spec.name)?;
+        check_name(&self.path, "name", &self.spec.name)?;
         self.check_tasks()?;
         self.check_generate()?;
         self.check_models()?;
@@ -74,15 +73,6 @@ impl Pipeline {
         let factor = self.spec.rollout.decisions_factor;
         if !(1.0..=100.0).contains(&factor) {
             return Err(self.value("rollout.decisions_factor", format!("is {factor}; allowed is 1 to 100")));
-        }
-        Ok(())
-    }
-
-    fn check_name(&self, key: &str, name: &str) -> Result<(), PipelineError> {
-        let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if name.is_empty() || name.len() > 64 || !name.chars().all(allowed) {
-            let problem = format!("is {name:?}; allowed are 1 to 64 letters, digits, '_' and '-'");
-            return Err(self.value(key, problem));
         }
         Ok(())
     }
@@ -157,13 +147,37 @@ impl Pipeline {
             if let Err(problem) = model.training.check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
+            self.check_acting(idx, model)?;
         }
         Ok(())
     }
 
+    /// How a model acts, and what.
+    fn check_acting(&self, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
+        let key = |field: &str| format!("models[{idx}].{field}");
+        if model.decoders.is_empty() {
+            return Err(self.value(&key("decoders"), format!("is empty; allowed are {}", decoder_names())));
+        }
+        if let Some(twice) = first_repeated(&model.decoders) {
+            return Err(self.value(&key("decoders"), format!("{} is there twice", twice.name())));
+        }
+        let Some(suites) = &model.suites else { return Ok(()) };
+        if let Some(twice) = first_repeated(suites) {
+            return Err(self.value(&key("suites"), format!("{twice:?} is there twice")));
+        }
+        let known: Vec<&str> = self.spec.rollout.suites.iter().map(|suite| suite.name.as_str()).collect();
+        match suites.iter().find(|name| !known.contains(&name.as_str())) {
+            Some(name) => {
+                let problem = format!("{name:?} is no suite of this file; there are {}", known.join(", "));
+                Err(self.value(&key("suites"), problem))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn check_suite(&self, idx: usize, suite: &SuiteSpec) -> Result<(), PipelineError> {
         let key = |field: &str| format!("rollout.suites[{idx}].{field}");
-        self.check_name(&key("name"), &suite.name)?;
+        check_name(&self.path, &key("name"), &suite.name)?;
         let earlier = &self.spec.rollout.suites[..idx];
         if earlier.iter().any(|other| other.name == suite.name) {
             return Err(self.value(&key("name"), format!("{:?} is there twice", suite.name)));
@@ -177,6 +191,37 @@ impl Pipeline {
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)
     }
+}
+
+/// The text of a file that people write.
+pub(super) fn read_text(path: &Path) -> Result<String, PipelineError> {
+    let syntax = |message: String| PipelineError::Syntax { path: path.to_owned(), message };
+    let bytes = std::fs::read(path).map_err(|error| syntax(format!("cannot be read: {error}")))?;
+    String::from_utf8(bytes).map_err(|error| syntax(format!("is not UTF-8: {error}")))
+}
+
+/// Reads a TOML file as what it shall be.
+pub(super) fn parse<T: DeserializeOwned>(path: &Path) -> Result<T, PipelineError> {
+    let syntax = |error| PipelineError::Syntax { path: path.to_owned(), message: format!("\n{error}") };
+    toml::from_str(&read_text(path)?).map_err(syntax)
+}
+
+/// Whether a name can be a folder's everywhere.
+pub(super) fn check_name(path: &Path, key: &str, name: &str) -> Result<(), PipelineError> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(allowed) {
+        let problem = format!("is {name:?}; allowed are 1 to 64 letters, digits, '_' and '-'");
+        return Err(PipelineError::Value { path: path.to_owned(), key: key.to_owned(), problem });
+    }
+    Ok(())
+}
+
+fn first_repeated<T: PartialEq>(items: &[T]) -> Option<&T> {
+    items.iter().enumerate().find_map(|(idx, item)| items[..idx].contains(item).then_some(item))
+}
+
+fn decoder_names() -> String {
+    Decoder::ALL.map(Decoder::name).join(", ")
 }
 
 impl SuiteSpec {

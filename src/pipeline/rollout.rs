@@ -10,19 +10,21 @@ use crate::artifact::{FileEntry, Plan, Receipt};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
 use crate::pipeline::generate::{demonstrate, simulation_config, world};
 use crate::pipeline::layout::model_name;
-use crate::pipeline::runner::{Context, Part, Unit};
+use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
 use crate::pipeline::trials::trial;
 use crate::pipeline::{PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
-use crate::rollout::{self, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
-use crate::task::{Task, TaskSet};
+use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
+use crate::task::{Split, Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance};
 
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
 /// How often the expert may try to demonstrate a task for a suite, each time from other initial positions.
 const DEMONSTRATION_ATTEMPTS: u64 = 20;
+/// What a policy is told to do by: the demonstration's observations.
+const TRAJECTORIES: &str = "trajectories";
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
@@ -30,57 +32,62 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let (_, task_inputs) = tasks::read(context)?;
     let spec = &context.pipeline.spec;
     let mut units = Vec::new();
-    for (model, seed) in actors(context) {
-        let inputs = match (model, seed) {
-            (Some(model), Some(seed)) => model_inputs(context, model, seed, &task_inputs)?,
-            _ => task_inputs.clone(),
+    for actor in actors(context) {
+        let inputs = match actor {
+            Some(actor) => model_inputs(context, actor, &task_inputs)?,
+            None => task_inputs.clone(),
         };
-        let (actor_name, decoder) = match model {
-            Some(idx) => {
-                let model_spec = &spec.models[idx];
-                let name = model_name(model_spec.variant, model_spec.train_tasks, seed.unwrap_or(0));
-                (name, Some(model_spec.decoder))
-            }
-            None => ("oracle".to_owned(), None),
-        };
+        let name = actor_name(context, actor);
         for (suite, suite_spec) in spec.rollout.suites.iter().enumerate() {
+            if actor.is_some_and(|actor| !spec.models[actor.model].acts(&suite_spec.name)) {
+                continue;
+            }
             let config = json!({
                 "seed": spec.seed,
                 "suite": suite_spec,
-                "decoder": decoder,
+                "decoder": actor.map(|actor| actor.decoder),
                 "record": spec.rollout.record,
                 "decisions_factor": spec.rollout.decisions_factor,
                 "simulation": spec.generate.simulation,
             });
             let shards = suite_spec.episodes.div_ceil(EPISODES_PER_SHARD);
             units.push(Unit {
-                name: format!("rollout {actor_name} {}", suite_spec.name),
-                dir: context.dir.rollouts(&actor_name, &suite_spec.name),
+                name: format!("rollout {name} {}", suite_spec.name),
+                dir: context.dir.rollouts(&name, &suite_spec.name),
                 plan: Plan::new(Stage::Rollout.name(), shards, inputs.clone(), config),
-                part: Part::Suite { actor: model.zip(seed), suite },
+                part: Part::Suite { actor, suite },
             });
         }
     }
     Ok(units)
 }
 
-/// Every trained model, and the oracle where it is asked for.
-fn actors(context: &Context<'_>) -> Vec<(Option<usize>, Option<u64>)> {
+/// The oracle (`None`) where it is asked for, and every trained model with each of its decoders.
+fn actors(context: &Context<'_>) -> Vec<Option<ModelActor>> {
     let spec = &context.pipeline.spec;
-    let oracle = spec.rollout.oracle.then_some((None, None));
-    let models = spec.models.iter().enumerate();
-    let trained = models.flat_map(|(idx, model)| model.seeds.iter().map(move |&seed| (Some(idx), Some(seed))));
-    oracle.into_iter().chain(trained).collect()
+    let mut actors = if spec.rollout.oracle { vec![None] } else { Vec::new() };
+    for (model, model_spec) in spec.models.iter().enumerate() {
+        for &seed in &model_spec.seeds {
+            actors.extend(model_spec.decoders.iter().map(|&decoder| Some(ModelActor { model, seed, decoder })));
+        }
+    }
+    actors
+}
+
+/// The folder of an actor's rollouts.
+fn actor_name(context: &Context<'_>, actor: Option<ModelActor>) -> String {
+    let Some(ModelActor { model, seed, decoder }) = actor else { return "oracle".to_owned() };
+    let spec = &context.pipeline.spec.models[model];
+    format!("{}-{}", model_name(spec.variant, spec.train_tasks, seed), decoder.name())
 }
 
 fn model_inputs(
     context: &Context<'_>,
-    model: usize,
-    seed: u64,
+    actor: ModelActor,
     task_inputs: &BTreeMap<String, String>,
 ) -> Result<BTreeMap<String, String>, PipelineError> {
-    let spec = &context.pipeline.spec.models[model];
-    let version = context.dir.model(&model_name(spec.variant, spec.train_tasks, seed)).version()?;
+    let spec = &context.pipeline.spec.models[actor.model];
+    let version = context.dir.model(&model_name(spec.variant, spec.train_tasks, actor.seed)).version()?;
     let mut inputs = task_inputs.clone();
     inputs.insert(Stage::Train.name().to_owned(), version);
     Ok(inputs)
@@ -99,7 +106,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let Part::Suite { actor, suite } = unit.part else { return Ok(()) };
     let (task_set, _) = tasks::read(context)?;
     let spec = &context.pipeline.spec.rollout.suites[suite];
-    let learned = actor.map(|(model, seed)| learned(context, model, seed));
+    let learned = actor.map(|actor| learned(context, actor, &task_set));
     let suite = Suite { context, unit, spec, tasks: suite_tasks(context, &task_set, spec)?, learned };
     unit.dir.begin(&unit.plan)?;
     let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
@@ -117,14 +124,21 @@ struct Learned {
     folder: PathBuf,
     variant: Variant,
     decoder: Decoder,
-    seed: u64,
+    acted: Acted,
 }
 
-fn learned(context: &Context<'_>, model: usize, seed: u64) -> Learned {
+fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Learned {
+    let ModelActor { model, seed, decoder } = actor;
     let spec = &context.pipeline.spec.models[model];
+    let n_seen = task_set.of_split(Split::Seen).count() as u32;
+    let acted = Acted {
+        training_seed: seed,
+        train_tasks: Some(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
+        specification: Some(TRAJECTORIES),
+        decoder: Some(decoder.name()),
+    };
     let name = model_name(spec.variant, spec.train_tasks, seed);
-    let folder = context.dir.model(&name).path().to_owned();
-    Learned { folder, variant: spec.variant, decoder: spec.decoder, seed }
+    Learned { folder: context.dir.model(&name).path().to_owned(), variant: spec.variant, decoder, acted }
 }
 
 impl Learned {
@@ -185,8 +199,8 @@ impl Suite<'_> {
         let starts: Result<Vec<Start<'_>>, PipelineError> = range.clone().map(|episode| self.start(episode)).collect();
         let acted = self.act(starts?)?;
         let part = format!("parts/part-{shard:05}.parquet");
-        let seed = self.learned.as_ref().map_or(0, |learned| learned.seed);
-        RolloutRows::of(&spec.name, seed, &acted).write(&unit.dir.path().join(&part))?;
+        let by = self.learned.as_ref().map(|learned| learned.acted.clone()).unwrap_or_default();
+        RolloutRows::of(&spec.name, &by, &acted).write(&unit.dir.path().join(&part))?;
         let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
         files.extend(self.record(shard, &acted)?);
         unit.dir.commit_shard(&Receipt {

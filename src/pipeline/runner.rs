@@ -7,7 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 
 use crate::artifact::{ContractError, IoError, Plan, RunLock, StageDir, remove_partials};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, convert, generate, report, rollout, tasks, train};
+use crate::model::Decoder;
+use crate::pipeline::costs::Costs;
+use crate::pipeline::{
+    Pipeline, PipelineError, RunDir, Stage, Study, convert, generate, report, rollout, tasks, train,
+};
+use crate::progress::Stopwatch;
 
 /// What the command line chooses.
 #[derive(Clone, Debug)]
@@ -26,6 +31,10 @@ pub struct Options {
     pub shard: Option<u32>,
     /// Whether progress is shown on stderr.
     pub progress: bool,
+    /// Of which commit the pipeline file is, for the costs.
+    pub commit: Option<String>,
+    /// Which experiment of a study is run; `None` for one by itself.
+    pub experiment: Option<String>,
     /// Set when the user presses Ctrl-C.
     pub stop: Arc<AtomicBool>,
 }
@@ -45,6 +54,9 @@ pub enum Status {
 /// What came of one unit of a stage, for people and for `--json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct StageReport {
+    /// Which experiment of a study; `None` for one by itself, and for the study's own report.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub experiment: Option<String>,
     /// The stage.
     pub stage: Stage,
     /// Which of its units: a model, a model's suite, or the stage's own name.
@@ -75,7 +87,18 @@ pub(super) enum Part {
     /// A model, by its place in the pipeline file and its seed.
     Model { model: usize, seed: u64 },
     /// A suite acted by a model, or by the oracle.
-    Suite { actor: Option<(usize, u64)>, suite: usize },
+    Suite { actor: Option<ModelActor>, suite: usize },
+}
+
+/// A trained model with a way to decode: who acts a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ModelActor {
+    /// Its place in the pipeline file.
+    pub(super) model: usize,
+    /// The seed of its training.
+    pub(super) seed: u64,
+    /// How it decodes scopes.
+    pub(super) decoder: Decoder,
 }
 
 /// What every stage is given.
@@ -108,7 +131,8 @@ impl Context<'_> {
     /// Progress of one unit.
     pub(super) fn progress(&self, unit: &Unit, total: u64, what: &str) -> crate::progress::Progress {
         if self.options.progress {
-            crate::progress::Progress::new(&unit.name, total, what)
+            let experiment = self.options.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
+            crate::progress::Progress::new(&format!("{experiment}{}", unit.name), total, what)
         } else {
             crate::progress::Progress::hidden()
         }
@@ -138,6 +162,32 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
     Ok(reports)
 }
 
+/// Runs the chosen stages of every experiment of a study, each in a folder of its name, then the report of them all.
+///
+/// # Errors
+///
+/// As [`run`]; [`PipelineError::Value`] for `--shard`, which is of one experiment.
+pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+    if options.shard.is_some() {
+        let problem = "is of one experiment: give its own file, and --out DIR/EXPERIMENT".to_owned();
+        return Err(PipelineError::Value { path: study.path.clone(), key: "--shard".to_owned(), problem });
+    }
+    let _lock = if options.dry_run { None } else { Some(RunLock::take(dir.root())?) };
+    let mut reports = Vec::new();
+    for pipeline in &study.experiments {
+        let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
+        reports.extend(run(pipeline, &dir.experiment(&pipeline.spec.name), &options)?);
+    }
+    if options.to == Stage::Report {
+        let units = report::study_units(study, dir, options);
+        for unit in or_what_comes_first(options, Stage::Report, units, &mut reports)?.unwrap_or_default() {
+            let work = || report::work_study(study, dir, options, &unit);
+            reports.push(run_unit(dir, options, Stage::Report, &unit, work)?);
+        }
+    }
+    Ok(reports)
+}
+
 /// A whole run has its directory alone and clears away what a killed one left; shards may be done side by side.
 fn lock(dir: &RunDir, options: &Options) -> Result<Option<RunLock>, PipelineError> {
     if options.dry_run {
@@ -152,13 +202,32 @@ fn lock(dir: &RunDir, options: &Options) -> Result<Option<RunLock>, PipelineErro
 }
 
 fn say_up_to_date(report: &StageReport) {
-    crate::progress::say(&format!("{}: up to date", report.unit));
+    let experiment = report.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
+    crate::progress::say(&format!("{experiment}{}: up to date", report.unit));
 }
 
 fn run_stage(context: &Context<'_>, stage: Stage, reports: &mut Vec<StageReport>) -> Result<(), PipelineError> {
-    let units = match units(context, stage) {
-        Err(PipelineError::Contract(ContractError::Unfinished { stage: before, .. })) if context.options.dry_run => {
+    let Some(units) = or_what_comes_first(context.options, stage, units(context, stage), reports)? else {
+        return Ok(());
+    };
+    for unit in units {
+        context.go_on()?;
+        reports.push(run_unit(context.dir, context.options, stage, &unit, || work(context, stage, &unit))?);
+    }
+    Ok(())
+}
+
+/// The units of a stage; in a dry run a line instead when another stage must come first.
+fn or_what_comes_first(
+    options: &Options,
+    stage: Stage,
+    units: Result<Vec<Unit>, PipelineError>,
+    reports: &mut Vec<StageReport>,
+) -> Result<Option<Vec<Unit>>, PipelineError> {
+    match units {
+        Err(PipelineError::Contract(ContractError::Unfinished { stage: before, .. })) if options.dry_run => {
             reports.push(StageReport {
+                experiment: options.experiment.clone(),
                 stage,
                 unit: stage.name().to_owned(),
                 status: Status::Needed,
@@ -166,18 +235,13 @@ fn run_stage(context: &Context<'_>, stage: Stage, reports: &mut Vec<StageReport>
                 episodes: 0,
                 failed: 0,
             });
-            return Ok(());
+            Ok(None)
         }
-        units => units?,
-    };
-    for unit in units {
-        context.go_on()?;
-        reports.push(run_unit(context, stage, &unit)?);
+        units => units.map(Some),
     }
-    Ok(())
 }
 
-fn units(context: &Context<'_>, stage: Stage) -> Result<Vec<Unit>, PipelineError> {
+pub(super) fn units(context: &Context<'_>, stage: Stage) -> Result<Vec<Unit>, PipelineError> {
     match stage {
         Stage::Tasks => tasks::units(context),
         Stage::Generate => generate::units(context),
@@ -199,22 +263,35 @@ fn work(context: &Context<'_>, stage: Stage, unit: &Unit) -> Result<(), Pipeline
     }
 }
 
-fn run_unit(context: &Context<'_>, stage: Stage, unit: &Unit) -> Result<StageReport, PipelineError> {
-    let need = if context.options.force { Some("--force".to_owned()) } else { why_needed(unit)? };
-    let status = match (&need, context.options.dry_run) {
+fn run_unit(
+    dir: &RunDir,
+    options: &Options,
+    stage: Stage,
+    unit: &Unit,
+    work: impl FnOnce() -> Result<(), PipelineError>,
+) -> Result<StageReport, PipelineError> {
+    let need = if options.force { Some("--force".to_owned()) } else { why_needed(unit)? };
+    let status = match (&need, options.dry_run) {
         (None, _) => Status::UpToDate,
         (Some(_), true) => Status::Needed,
         (Some(_), false) => {
-            if context.options.force {
+            if options.force {
                 unit.dir.clear()?;
             }
-            work(context, stage, unit)?;
+            let watch = Stopwatch::start();
+            let worked = work();
+            if options.shard.is_none() {
+                let costs = Costs::read(dir)?;
+                costs.add(dir, stage, (&unit.name, &unit.plan), watch.taken(), options.commit.as_deref())?;
+            }
+            worked?;
             Status::Done
         }
     };
     let manifest = unit.dir.manifest()?;
     let counts = manifest.filter(|_| status != Status::Needed).map_or((0, 0), |m| (m.episodes, m.failed));
     Ok(StageReport {
+        experiment: options.experiment.clone(),
         stage,
         unit: unit.name.clone(),
         status,

@@ -114,9 +114,12 @@ pub struct ModelSpec {
     /// Train on the first so many training tasks; all when left out.
     #[serde(default)]
     pub train_tasks: Option<u32>,
-    /// How the chosen part of a demonstration is decoded.
+    /// How the chosen part of a demonstration is decoded; with several, each acts every suite. Trained once.
+    #[serde(default = "mss")]
+    pub decoders: Vec<Decoder>,
+    /// The names of the suites that it acts; all when left out.
     #[serde(default)]
-    pub decoder: Decoder,
+    pub suites: Option<Vec<String>>,
     /// How it is trained.
     #[serde(default)]
     pub training: TrainConfig,
@@ -124,6 +127,17 @@ pub struct ModelSpec {
 
 fn one_seed() -> Vec<u64> {
     vec![0]
+}
+
+fn mss() -> Vec<Decoder> {
+    vec![Decoder::Mss]
+}
+
+impl ModelSpec {
+    /// Whether it acts a suite.
+    pub(super) fn acts(&self, suite: &str) -> bool {
+        self.suites.as_ref().is_none_or(|suites| suites.iter().any(|name| name == suite))
+    }
 }
 
 /// How models are evaluated.

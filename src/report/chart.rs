@@ -11,6 +11,8 @@ pub(super) mod scale;
 
 use serde::Serialize;
 
+use crate::report::order;
+
 /// How many colours the style sheet has for variants, and as many others for causes and kinds.
 pub(super) const N_COLORS: usize = 8;
 
@@ -56,9 +58,9 @@ impl Panel {
     }
 }
 
-/// The colour of each of some names: its place among all, over again when there are more names than colours.
-pub(in crate::report) fn color_of(names: &[String], name: &str) -> usize {
-    names.iter().position(|other| other == name).unwrap_or(0) % N_COLORS
+/// The colour of a variant: the same in every report, and for both encoders.
+pub(in crate::report) fn color_of(variant: &str) -> usize {
+    order::variant_rank(variant) % N_COLORS
 }
 
 /// Names as they are in order of appearance, each once.

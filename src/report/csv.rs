@@ -9,15 +9,20 @@ use crate::report::summary::SuiteResult;
 /// Digits behind the point: finer than any interval, coarse enough to read.
 const PRECISION: usize = 6;
 
-/// One row for each variant, suite and training seed; causes as `name=count` with `;` between.
+/// One row for each actor, suite and training seed; causes as `name=count` with `;` between.
 pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
     let text = |of: fn(&SuiteResult) -> &str| results.iter().map(of).collect::<Vec<_>>();
+    let maybe = |of: fn(&SuiteResult) -> Option<&str>| results.iter().map(of).collect::<Vec<_>>();
     let real = |of: fn(&SuiteResult) -> f64| results.iter().map(of).collect::<Vec<_>>();
     let whole = |of: fn(&SuiteResult) -> u64| results.iter().map(of).collect::<Vec<_>>();
     let cause = |(cause, count): (&String, &u64)| format!("{cause}={count}");
     let causes = |result: &SuiteResult| result.causes.iter().map(cause).collect::<Vec<_>>().join(";");
     let table = df!(
-        "variant" => text(|result| &result.variant),
+        "experiment" => text(|result| &result.actor.experiment),
+        "variant" => text(|result| &result.actor.variant),
+        "train_tasks" => results.iter().map(|result| result.actor.train_tasks).collect::<Vec<_>>(),
+        "specification" => maybe(|result| result.actor.specification.as_deref()),
+        "decoder" => maybe(|result| result.actor.decoder.as_deref()),
         "suite" => text(|result| &result.suite),
         "seed" => results.iter().map(|result| result.seed).collect::<Vec<_>>(),
         "episodes" => whole(|result| result.episodes),
@@ -36,8 +41,10 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
 pub(super) fn curves(curves: &[Curve]) -> Result<Vec<u8>, ReportError> {
     let points = || curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)));
     let table = df!(
-        "variant" => points().map(|(curve, _)| curve.variant.as_str()).collect::<Vec<_>>(),
-        "seed" => points().map(|(curve, _)| curve.seed).collect::<Vec<_>>(),
+        "experiment" => points().map(|(curve, _)| curve.model.experiment.as_str()).collect::<Vec<_>>(),
+        "variant" => points().map(|(curve, _)| curve.model.variant.as_str()).collect::<Vec<_>>(),
+        "train_tasks" => points().map(|(curve, _)| curve.model.train_tasks).collect::<Vec<_>>(),
+        "seed" => points().map(|(curve, _)| curve.model.seed).collect::<Vec<_>>(),
         "level" => points().map(|(curve, _)| curve.level.as_str()).collect::<Vec<_>>(),
         "step" => points().map(|(_, point)| point.step).collect::<Vec<_>>(),
     );

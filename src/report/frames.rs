@@ -53,10 +53,20 @@ impl Rows<'_> {
         Ok(column.iter().map(|value| value.unwrap_or_default().to_owned()).collect())
     }
 
+    /// Text, `None` where there is none.
+    pub(super) fn optional_text(&self, name: &str) -> Result<Vec<Option<String>>, ReportError> {
+        let column = self.column(name)?.str().map_err(ReportError::Query)?;
+        Ok(column.iter().map(|value| value.map(str::to_owned)).collect())
+    }
+
+    /// Whole numbers, `None` where there is none.
+    pub(super) fn optional_whole(&self, name: &str) -> Result<Vec<Option<i64>>, ReportError> {
+        let column = self.column(name)?.cast(&DataType::Int64).map_err(ReportError::Query)?;
+        Ok(column.i64().map_err(ReportError::Query)?.iter().collect())
+    }
+
     /// Whole numbers, 0 where there is none.
     pub(super) fn whole(&self, name: &str) -> Result<Vec<i64>, ReportError> {
-        let column = self.column(name)?.cast(&DataType::Int64).map_err(ReportError::Query)?;
-        let column = column.i64().map_err(ReportError::Query)?;
-        Ok(column.iter().map(Option::unwrap_or_default).collect())
+        Ok(self.optional_whole(name)?.into_iter().map(Option::unwrap_or_default).collect())
     }
 }

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use polars::prelude::{DataType, Expr, NULL, col, lit, when};
 
 use crate::report::frames::{Rows, collect, scan};
-use crate::report::summary::TrainingEnd;
+use crate::report::summary::{ModelSummary, TrainingEnd};
 use crate::report::{ReportError, order};
 
 /// Most points of a curve.
@@ -26,13 +26,11 @@ const UNITS_PER_LOSS: f64 = 1e9;
 /// The parts of the loss, the whole of it first.
 pub(super) const PARTS: [&str; 5] = ["loss_total", "loss_program", "loss_end", "loss_scope", "loss_argument"];
 
-/// The metrics table of one training.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// One training and its metrics table.
+#[derive(Clone, Debug, PartialEq)]
 pub struct MetricsInput {
-    /// The model's variant.
-    pub variant: String,
-    /// The seed of its training.
-    pub seed: i64,
+    /// The model that came of it.
+    pub model: ModelSummary,
     /// Its metrics.parquet.
     pub path: PathBuf,
 }
@@ -40,8 +38,7 @@ pub struct MetricsInput {
 /// One training's losses at one program level.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Curve {
-    pub(super) variant: String,
-    pub(super) seed: i64,
+    pub(super) model: ModelSummary,
     pub(super) level: String,
     pub(super) points: Vec<CurvePoint>,
 }
@@ -61,7 +58,10 @@ pub(super) fn read(inputs: &[MetricsInput]) -> Result<Vec<Curve>, ReportError> {
     for input in inputs {
         curves.extend(read_one(input)?);
     }
-    curves.sort_by_cached_key(|curve| (order::variant(&curve.variant), curve.seed, order::level(&curve.level)));
+    curves.sort_by_cached_key(|curve| {
+        let model = &curve.model;
+        (order::variant(&model.variant), model.train_tasks, model.seed, order::level(&curve.level))
+    });
     Ok(curves)
 }
 
@@ -93,12 +93,7 @@ fn read_one(input: &MetricsInput) -> Result<Vec<Curve>, ReportError> {
         let point = CurvePoint { step: steps[row], losses: [0, 1, 2, 3, 4].map(|part| mean(part, row)) };
         match curves.last_mut().filter(|curve| curve.level == levels[row]) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(Curve {
-                variant: input.variant.clone(),
-                seed: input.seed,
-                level: levels[row].clone(),
-                points: vec![point],
-            }),
+            None => curves.push(Curve { model: input.model.clone(), level: levels[row].clone(), points: vec![point] }),
         }
     }
     Ok(curves)
@@ -128,8 +123,10 @@ pub(super) fn ends(curves: &[Curve]) -> Vec<TrainingEnd> {
     let end = |curve: &Curve| {
         let last = curve.points.last()?;
         Some(TrainingEnd {
-            variant: curve.variant.clone(),
-            seed: curve.seed,
+            experiment: curve.model.experiment.clone(),
+            variant: curve.model.variant.clone(),
+            train_tasks: curve.model.train_tasks,
+            seed: curve.model.seed,
             level: curve.level.clone(),
             step: last.step,
             loss_total: last.losses[0],

@@ -1,10 +1,16 @@
 //! The order in which variants, suites and levels are told: always the same, whatever the order of files and rows.
 
+use std::cmp::Reverse;
+
 use crate::program::Program;
+use crate::report::summary::Actor;
 use crate::task::Family;
 
 /// Variants from the paper's model to its ancestor; the oracle stands last.
 const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru", "npi", "oracle"];
+
+/// Decoders, the one that stands for its model where only one can be shown first.
+pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];
 
 /// What a suite asks of a family.
 const PARTS: [&str; 4] = ["unseen", "seen", "topology", "adversary"];
@@ -22,11 +28,22 @@ fn natural(name: &str) -> Vec<Word> {
     words.collect()
 }
 
+/// The place of a variant's kind, whichever its encoder.
+pub(super) fn variant_rank(name: &str) -> usize {
+    let base = name.strip_suffix("_paper").unwrap_or(name);
+    VARIANTS.iter().position(|&known| known == base).unwrap_or(VARIANTS.len())
+}
+
 /// Known variants first, each before its form with the paper's encoder; others behind.
 pub(super) fn variant(name: &str) -> (usize, Vec<Word>) {
-    let base = name.strip_suffix("_paper").unwrap_or(name);
-    let rank = VARIANTS.iter().position(|&known| known == base).unwrap_or(VARIANTS.len());
-    (rank, natural(name))
+    (variant_rank(name), natural(name))
+}
+
+/// By variant, then by how much it was trained on, the most first, then by decoder; experiments stand together.
+pub(super) fn actor(actor: &Actor) -> impl Ord + use<> {
+    let Actor { experiment, variant: name, train_tasks, specification, decoder } = actor.clone();
+    let decoder_rank = decoder.as_ref().and_then(|name| DECODERS.iter().position(|&known| known == name));
+    (experiment, variant(&name), Reverse(train_tasks), specification, decoder_rank, decoder)
 }
 
 /// Families in their order; within one the held-out tasks first, since they are what counts.

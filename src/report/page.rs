@@ -12,8 +12,8 @@ use crate::report::chart::histogram::{self, Histograms};
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::chart::{Key, PANEL, Panel, color_of, distinct};
 use crate::report::metrics::{self, Curve};
-use crate::report::order;
-use crate::report::summary::{Aggregate, Report, SuiteResult};
+use crate::report::order::{self, DECODERS};
+use crate::report::summary::{Actor, Aggregate, Fact, Report, SuiteResult};
 
 /// Most headline figures.
 const N_TILES: usize = 4;
@@ -35,6 +35,14 @@ struct Page<'a> {
     /// Most training steps behind a point of a curve.
     steps_per_point: String,
     divergence: Option<Histograms>,
+    facts: Vec<FactGroup<'a>>,
+}
+
+/// What there is to say of one experiment.
+#[derive(Serialize)]
+struct FactGroup<'a> {
+    experiment: &'a str,
+    facts: &'a [Fact],
 }
 
 /// A headline figure.
@@ -56,6 +64,8 @@ struct Tile {
 struct Row {
     suite: String,
     variant: String,
+    tasks: Option<String>,
+    decoder: Option<String>,
     color: usize,
     mean: String,
     low: String,
@@ -85,11 +95,8 @@ struct SeedRow {
 
 /// The page of a report.
 pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, minijinja::Error> {
-    let names = report.aggregates.iter().map(|row| &row.variant).chain(curves.iter().map(|curve| &curve.variant));
-    let mut names = distinct(names);
-    names.sort_by_cached_key(|name| order::variant(name));
-    let trained = distinct(curves.iter().map(|curve| &curve.variant));
-    let key = |name: &String| Key { label: name.clone(), color: color_of(&names, name) };
+    let trained = distinct(curves.iter().map(|curve| &curve.model.variant));
+    let key = |name: &String| Key { label: name.clone(), color: color_of(name) };
     let last_step = curves.iter().flat_map(|curve| &curve.points).map(|point| point.step).max().unwrap_or(0);
     let steps_per_point = metrics::steps_per_bin(last_step) as u64;
     let page = Page {
@@ -98,14 +105,15 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
         panel: PANEL,
         lede: lede(report),
         tiles: tiles(&report.aggregates),
-        dots: dots::plot(&report.aggregates, &report.results, &names),
-        rows: rows(&report.aggregates, &names),
+        dots: dots::plot(&report.aggregates, &report.results),
+        rows: rows(&report.aggregates),
         seeds: report.results.iter().map(seed_row).collect(),
         bars: bars::plot(&report.aggregates),
         variants: trained.iter().map(key).collect(),
-        curves: curves::grids(curves, &names),
+        curves: curves::grids(curves),
         steps_per_point: plural(steps_per_point, "step", "steps"),
         divergence: histogram::plot(&report.divergences, &report.aggregates),
+        facts: fact_groups(&report.facts),
     };
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -116,12 +124,28 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
     environment.get_template("page.html.j2")?.render(page)
 }
 
+fn fact_groups(facts: &[Fact]) -> Vec<FactGroup<'_>> {
+    let groups = facts.chunk_by(|a, b| a.experiment == b.experiment);
+    groups.map(|facts| FactGroup { experiment: &facts[0].experiment, facts }).collect()
+}
+
 /// A name for reading: `stacking_unseen` is `Stacking · unseen`.
 pub(super) fn title_of(name: &str) -> String {
     let (first, rest) = name.split_once('_').unwrap_or((name, ""));
     let mut letters = first.chars();
     let first: String = letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect();
     if rest.is_empty() { first } else { format!("{first} · {}", rest.replace('_', " ")) }
+}
+
+/// An actor in a few words: `ntp`, and what else tells it apart.
+pub(super) fn name_of(actor: &Actor) -> String {
+    let tasks = actor.train_tasks.map(|tasks| format!(" {tasks}"));
+    let decoder = actor.decoder.as_deref().filter(|decoder| *decoder != DECODERS[0]).map(|name| format!(" {name}"));
+    format!("{}{}{}", actor.variant, tasks.unwrap_or_default(), decoder.unwrap_or_default())
+}
+
+fn tasks_of(actor: &Actor) -> Option<String> {
+    actor.train_tasks.map(|tasks| thousands(tasks.max(0) as u64))
 }
 
 fn plural(count: u64, one: &str, many: &str) -> String {
@@ -136,7 +160,7 @@ fn lede(report: &Report) -> Vec<String> {
     let mut seeds: Vec<i64> = report.results.iter().map(|row| row.seed).collect();
     seeds.sort_unstable();
     seeds.dedup();
-    let variants = distinct(report.aggregates.iter().map(|row| &row.variant)).len() as u64;
+    let variants = distinct(report.aggregates.iter().map(|row| &row.actor.variant)).len() as u64;
     let suites = distinct(report.aggregates.iter().map(|row| &row.suite)).len() as u64;
     vec![
         plural(episodes, "rollout", "rollouts"),
@@ -148,11 +172,11 @@ fn lede(report: &Report) -> Vec<String> {
 
 /// The first variant's suites: it is the one the run is about.
 fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
-    let lead = aggregates.iter().map(|row| &row.variant).min_by_key(|variant| order::variant(variant));
-    let own = aggregates.iter().filter(|row| Some(&row.variant) == lead);
+    let lead = aggregates.iter().map(|row| &row.actor.variant).min_by_key(|variant| order::variant(variant));
+    let own = aggregates.iter().filter(|row| Some(&row.actor.variant) == lead);
     let tile = |row: &Aggregate| Tile {
         suite: title_of(&row.suite),
-        variant: row.variant.clone(),
+        variant: name_of(&row.actor),
         value: percent(row.mean_success_rate),
         low: percent(row.wilson_low),
         high: percent(row.wilson_high),
@@ -169,12 +193,14 @@ fn points(difference: f64) -> String {
     format!("{sign}{:.1}", 100.0 * difference.abs())
 }
 
-fn rows(aggregates: &[Aggregate], variants: &[String]) -> Vec<Row> {
+fn rows(aggregates: &[Aggregate]) -> Vec<Row> {
     let starts_suite = |at: usize| at == 0 || aggregates[at - 1].suite != aggregates[at].suite;
     let row = |(at, row): (usize, &Aggregate)| Row {
         suite: row.suite.clone(),
-        variant: row.variant.clone(),
-        color: color_of(variants, &row.variant),
+        variant: row.actor.variant.clone(),
+        tasks: tasks_of(&row.actor),
+        decoder: row.actor.decoder.clone(),
+        color: color_of(&row.actor.variant),
         mean: percent(row.mean_success_rate),
         low: percent(row.wilson_low),
         high: percent(row.wilson_high),
@@ -190,7 +216,7 @@ fn rows(aggregates: &[Aggregate], variants: &[String]) -> Vec<Row> {
 fn seed_row(row: &SuiteResult) -> SeedRow {
     SeedRow {
         suite: row.suite.clone(),
-        variant: row.variant.clone(),
+        variant: name_of(&row.actor),
         seed: row.seed,
         successes: thousands(row.successes),
         episodes: thousands(row.episodes),

@@ -11,15 +11,15 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use polars::prelude::{DataType, Expr, LazyFrame, SortMultipleOptions, UnionArgs, col, concat, len, lit, when};
+use polars::prelude::{DataType, Expr, LazyFrame, NULL, SortMultipleOptions, UnionArgs, col, concat, len, lit, when};
 
 use crate::report::chart::histogram::KINDS;
 use crate::report::frames::{Rows, collect, scan};
 use crate::report::interval::wilson;
-use crate::report::summary::{Aggregate, Divergence, SuiteResult};
-use crate::report::{PaperValue, ReportError, order};
+use crate::report::summary::{Actor, Divergence, FirstError, SuiteResult};
+use crate::report::{ReportError, order};
 
-const COLUMNS: [(&str, DataType); 11] = [
+const COLUMNS: [(&str, DataType); 15] = [
     ("variant", DataType::String),
     ("suite", DataType::String),
     ("training_seed", DataType::Int64),
@@ -31,29 +31,55 @@ const COLUMNS: [(&str, DataType); 11] = [
     ("divergence_kind", DataType::String),
     ("divergence_program", DataType::String),
     ("sim_secs", DataType::Float64),
+    ("train_tasks", DataType::Int64),
+    ("specification", DataType::String),
+    ("decoder", DataType::String),
+    ("fault_decision", DataType::Int64),
 ];
 
-const KEY: [&str; 3] = ["variant", "suite", "training_seed"];
+/// What a file does not say of itself: to which experiment it belongs.
+const EXPERIMENT: &str = "experiment";
+/// What tells actors apart; see [`Actor`].
+const ACTOR: [&str; 5] = [EXPERIMENT, "variant", "train_tasks", "specification", "decoder"];
 const MICROS_PER_SEC: f64 = 1e6;
+
+/// The rollouts of one model in one suite.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RolloutsInput {
+    /// Of which experiment.
+    pub experiment: String,
+    /// Its rollouts.parquet.
+    pub path: PathBuf,
+}
 
 /// What the rollouts say.
 #[derive(Debug, Default)]
 pub(super) struct Rollouts {
     pub(super) results: Vec<SuiteResult>,
     pub(super) divergences: Vec<Divergence>,
+    pub(super) errors: Vec<FirstError>,
 }
 
 /// Reads and sums up; nothing when there are no files.
-pub(super) fn read(paths: &[PathBuf]) -> Result<Rollouts, ReportError> {
-    if paths.is_empty() {
+pub(super) fn read(inputs: &[RolloutsInput]) -> Result<Rollouts, ReportError> {
+    if inputs.is_empty() {
         return Ok(Rollouts::default());
     }
-    for path in paths {
-        check_rows(path)?;
+    for input in inputs {
+        check_rows(&input.path)?;
     }
-    let frames = paths.iter().map(|path| scan(path, &COLUMNS)).collect::<Result<Vec<_>, _>>()?;
+    let frames = inputs.iter().map(|input| {
+        let experiment = lit(input.experiment.clone()).alias(EXPERIMENT);
+        Ok(scan(&input.path, &COLUMNS)?.with_column(experiment))
+    });
+    let frames = frames.collect::<Result<Vec<_>, ReportError>>()?;
+    let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
     let all = concat(&frames, UnionArgs::default()).map_err(ReportError::Query)?;
-    Ok(Rollouts { results: results(&all, paths)?, divergences: divergences(all, paths)? })
+    Ok(Rollouts {
+        results: results(&all, &paths)?,
+        errors: errors(&all, &paths)?,
+        divergences: divergences(all, &paths)?,
+    })
 }
 
 /// A table whose columns contradict each other is not trusted: `success` says again what `outcome` says, and a
@@ -65,7 +91,10 @@ fn check_rows(path: &PathBuf) -> Result<(), ReportError> {
     let divergence = col("first_divergence").is_not_null().and(known.not());
     for (problem, wrong) in [
         ("success is not what the outcome says", outcome),
-        ("first_divergence has no program, or a kind that is not one of program, argument, scope, end", divergence),
+        (
+            "first_divergence has no program, or a kind that is not one of program, argument, scope, early_end, late_end",
+            divergence,
+        ),
     ] {
         let table =
             collect(scan(path, &COLUMNS)?.filter(wrong).select([len().alias("rows")]), std::slice::from_ref(path))?;
@@ -76,8 +105,25 @@ fn check_rows(path: &PathBuf) -> Result<(), ReportError> {
     Ok(())
 }
 
-fn key() -> [Expr; 3] {
-    KEY.map(col)
+fn key(more: &[&str]) -> Vec<Expr> {
+    [ACTOR.as_slice(), more].concat().into_iter().map(col).collect()
+}
+
+/// The actor of each row of a table that was grouped by [`key`].
+fn actors(rows: &Rows<'_>) -> Result<Vec<Actor>, ReportError> {
+    let (experiments, variants) = (rows.text(EXPERIMENT)?, rows.text("variant")?);
+    let train_tasks = rows.optional_whole("train_tasks")?;
+    let (specifications, decoders) = (rows.optional_text("specification")?, rows.optional_text("decoder")?);
+    let names = experiments.into_iter().zip(variants);
+    let settings = train_tasks.into_iter().zip(specifications).zip(decoders);
+    let actor = |((experiment, variant), ((train_tasks, specification), decoder))| Actor {
+        experiment,
+        variant,
+        train_tasks,
+        specification,
+        decoder,
+    };
+    Ok(names.zip(settings).map(actor).collect())
 }
 
 fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, ReportError> {
@@ -89,24 +135,26 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         col("calls").sum(),
         micros.alias("sim_micros"),
     ];
-    let by_seed = all.clone().group_by(key()).agg(sums).sort(KEY, SortMultipleOptions::default());
-    let table = collect(by_seed, paths)?;
+    let by = key(&["suite", "training_seed"]);
+    let grouped = all.clone().group_by(by.clone()).agg(sums);
+    let table = collect(grouped.sort_by_exprs(by, SortMultipleOptions::default()), paths)?;
     let rows = Rows(&table);
-    let (variants, suites, seeds) = (rows.text("variant")?, rows.text("suite")?, rows.whole("training_seed")?);
+    let (suites, seeds) = (rows.text("suite")?, rows.whole("training_seed")?);
     let (episodes, distinct) = (rows.whole("episodes")?, rows.whole("distinct")?);
     let (successes, calls, micros) = (rows.whole("successes")?, rows.whole("calls")?, rows.whole("sim_micros")?);
     let mut causes = causes(all, paths)?;
     let mut results = Vec::with_capacity(table.height());
-    for row in 0..table.height() {
-        let (variant, suite, seed) = (variants[row].clone(), suites[row].clone(), seeds[row]);
+    for (row, actor) in actors(&rows)?.into_iter().enumerate() {
+        let (suite, seed) = (suites[row].clone(), seeds[row]);
         if distinct[row] != episodes[row] {
-            return Err(ReportError::Repeated { variant, suite, seed, rows: episodes[row] - distinct[row] });
+            let rows = episodes[row] - distinct[row];
+            return Err(ReportError::Repeated { actor: Box::new(actor), suite, seed, rows });
         }
         let n = episodes[row].max(1) as f64;
         let (wilson_low, wilson_high) = wilson(successes[row] as u64, episodes[row] as u64);
         results.push(SuiteResult {
-            causes: causes.remove(&(variant.clone(), suite.clone(), seed)).unwrap_or_default(),
-            variant,
+            causes: causes.remove(&(actor.clone(), suite.clone(), seed)).unwrap_or_default(),
+            actor,
             suite,
             seed,
             episodes: episodes[row] as u64,
@@ -118,25 +166,50 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
             mean_sim_secs: micros[row] as f64 / MICROS_PER_SEC / n,
         });
     }
-    results.sort_by_cached_key(|result| (order::suite(&result.suite), order::variant(&result.variant), result.seed));
+    results.sort_by_cached_key(|result| (order::suite(&result.suite), order::actor(&result.actor), result.seed));
     Ok(results)
 }
 
-type Causes = BTreeMap<(String, String, i64), BTreeMap<String, u64>>;
+type Causes = BTreeMap<(Actor, String, i64), BTreeMap<String, u64>>;
 
 fn causes(all: &LazyFrame, paths: &[PathBuf]) -> Result<Causes, ReportError> {
-    let by = [KEY.as_slice(), &["outcome"]].concat().into_iter().map(col).collect::<Vec<_>>();
-    let failures = all.clone().filter(col("success").not()).group_by(by).agg([len().alias("episodes")]);
-    let table = collect(failures, paths)?;
+    let failures = all.clone().filter(col("success").not());
+    let counts = failures.group_by(key(&["suite", "training_seed", "outcome"])).agg([len().alias("episodes")]);
+    let table = collect(counts, paths)?;
     let rows = Rows(&table);
-    let (variants, suites, seeds) = (rows.text("variant")?, rows.text("suite")?, rows.whole("training_seed")?);
+    let (suites, seeds) = (rows.text("suite")?, rows.whole("training_seed")?);
     let (outcomes, episodes) = (rows.text("outcome")?, rows.whole("episodes")?);
     let mut causes = Causes::new();
-    for row in 0..table.height() {
-        let key = (variants[row].clone(), suites[row].clone(), seeds[row]);
-        causes.entry(key).or_default().insert(outcomes[row].clone(), episodes[row] as u64);
+    for (row, actor) in actors(&rows)?.into_iter().enumerate() {
+        let counts = causes.entry((actor, suites[row].clone(), seeds[row])).or_default();
+        counts.insert(outcomes[row].clone(), episodes[row] as u64);
     }
     Ok(causes)
+}
+
+/// A failed rollout's first error is its first departure from the expert, unless physics went wrong before, or nothing
+/// was decided otherwise at all.
+fn errors(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<FirstError>, ReportError> {
+    let in_time = col("fault_decision").is_null().or(col("fault_decision").gt_eq(col("first_divergence")));
+    let decided = col("first_divergence").is_not_null().and(in_time);
+    let error = when(decided.clone()).then(col("divergence_kind")).otherwise(lit("physics")).alias("error");
+    let program = when(decided).then(col("divergence_program")).otherwise(lit(NULL)).alias("program");
+    let failures = all.clone().filter(col("success").not()).with_columns([error, program]);
+    let counts = failures.group_by(key(&["suite", "error", "program"])).agg([len().alias("episodes")]);
+    let table = collect(counts, paths)?;
+    let rows = Rows(&table);
+    let (suites, errors) = (rows.text("suite")?, rows.text("error")?);
+    let (programs, episodes) = (rows.optional_text("program")?, rows.whole("episodes")?);
+    let first = |(row, actor): (usize, Actor)| FirstError {
+        actor,
+        suite: suites[row].clone(),
+        program: programs[row].clone(),
+        error: errors[row].clone(),
+        episodes: episodes[row] as u64,
+    };
+    let mut errors: Vec<FirstError> = actors(&rows)?.into_iter().enumerate().map(first).collect();
+    errors.sort();
+    Ok(errors)
 }
 
 fn divergences(all: LazyFrame, paths: &[PathBuf]) -> Result<Vec<Divergence>, ReportError> {
@@ -160,37 +233,4 @@ fn divergences(all: LazyFrame, paths: &[PathBuf]) -> Result<Vec<Divergence>, Rep
     let mut divergences: Vec<Divergence> = (0..table.height()).map(divergence).collect();
     divergences.sort();
     Ok(divergences)
-}
-
-/// Sums results over training seeds. They stand sorted, so those of one variant and suite are neighbours.
-pub(super) fn aggregates(results: &[SuiteResult], paper: &[PaperValue]) -> Vec<Aggregate> {
-    let same = |a: &SuiteResult, b: &SuiteResult| (&a.variant, &a.suite) == (&b.variant, &b.suite);
-    results.chunk_by(same).map(|seeds| aggregate(seeds, paper)).collect()
-}
-
-fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
-    let (variant, suite) = (seeds[0].variant.clone(), seeds[0].suite.clone());
-    let rates = || seeds.iter().map(|seed| seed.success_rate);
-    let episodes = seeds.iter().map(|seed| seed.episodes).sum();
-    let successes = seeds.iter().map(|seed| seed.successes).sum();
-    let (wilson_low, wilson_high) = wilson(successes, episodes);
-    let mut causes = BTreeMap::new();
-    for (cause, count) in seeds.iter().flat_map(|seed| &seed.causes) {
-        *causes.entry(cause.clone()).or_default() += count;
-    }
-    let paper_success_rate = paper.iter().find(|value| value.is_for(&variant, &suite)).map(|value| value.success_rate);
-    Aggregate {
-        variant,
-        suite,
-        seeds: seeds.len() as u64,
-        episodes,
-        successes,
-        mean_success_rate: rates().sum::<f64>() / seeds.len() as f64,
-        lowest_success_rate: rates().fold(1.0, f64::min),
-        highest_success_rate: rates().fold(0.0, f64::max),
-        wilson_low,
-        wilson_high,
-        causes,
-        paper_success_rate,
-    }
 }

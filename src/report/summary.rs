@@ -23,14 +23,22 @@ pub struct Report {
     pub ntp_version: String,
     /// What the run is called.
     pub title: String,
-    /// One for each variant, suite and training seed.
+    /// One for each actor, suite and training seed.
     pub results: Vec<SuiteResult>,
-    /// One for each variant and suite, over training seeds.
+    /// One for each actor and suite, over training seeds.
     pub aggregates: Vec<Aggregate>,
     /// Where rollouts first decided otherwise than the expert.
     pub divergences: Vec<Divergence>,
+    /// What failed rollouts did wrong first.
+    pub errors: Vec<FirstError>,
     /// The end of each training curve; the whole curves are in curves.csv.
     pub training: Vec<TrainingEnd>,
+    /// The trained models.
+    pub models: Vec<ModelSummary>,
+    /// What each stage took, where it was measured: the only figures that differ between equal runs.
+    pub costs: Vec<StageCost>,
+    /// Of which commits the pipeline files were when the stages ran, where that is known.
+    pub commits: Vec<String>,
     /// The paper's figures.
     pub paper: Vec<PaperValue>,
     /// What else there is to say of the run.
@@ -39,11 +47,27 @@ pub struct Report {
     pub inputs: Vec<InputFile>,
 }
 
+/// Who acts: what tells models apart but for the seed of their training.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct Actor {
+    /// Of which experiment: a pipeline file's name.
+    pub experiment: String,
+    /// The model's variant.
+    pub variant: String,
+    /// How many tasks it was trained on; null for an oracle.
+    pub train_tasks: Option<i64>,
+    /// What a demonstration is given as; null for an oracle.
+    pub specification: Option<String>,
+    /// How scopes are decoded; null for an oracle.
+    pub decoder: Option<String>,
+}
+
 /// The rollouts of one trained model in one suite.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SuiteResult {
-    /// The model's variant.
-    pub variant: String,
+    /// Who acted.
+    #[serde(flatten)]
+    pub actor: Actor,
     /// The set of evaluation tasks.
     pub suite: String,
     /// The seed of its training.
@@ -66,11 +90,12 @@ pub struct SuiteResult {
     pub mean_sim_secs: f64,
 }
 
-/// One variant in one suite, over training seeds.
+/// One actor in one suite, over training seeds.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Aggregate {
-    /// The models' variant.
-    pub variant: String,
+    /// Who acted.
+    #[serde(flatten)]
+    pub actor: Actor,
     /// The set of evaluation tasks.
     pub suite: String,
     /// How many training seeds.
@@ -106,7 +131,7 @@ pub struct Divergence {
     pub ended: String,
     /// Index of the decision, from 0.
     pub decision: i64,
-    /// What differed: `program`, `argument`, `scope` or `end`.
+    /// What differed: `program`, `argument`, `scope`, `early_end` or `late_end`.
     pub kind: String,
     /// The program that decided.
     pub program: String,
@@ -114,11 +139,61 @@ pub struct Divergence {
     pub episodes: u64,
 }
 
+/// Failed rollouts of an actor in a suite that went wrong first in the same way.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct FirstError {
+    /// Who acted.
+    #[serde(flatten)]
+    pub actor: Actor,
+    /// The set of evaluation tasks.
+    pub suite: String,
+    /// The program that decided wrongly: the level of the error. Null when physics went wrong first.
+    pub program: Option<String>,
+    /// What was wrong: `program`, `argument`, `scope`, `early_end`, `late_end`, or `physics` when no decision was.
+    pub error: String,
+    /// How many rollouts.
+    pub episodes: u64,
+}
+
+/// One trained model.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ModelSummary {
+    /// Of which experiment.
+    pub experiment: String,
+    /// Its variant.
+    pub variant: String,
+    /// How many tasks it was trained on.
+    pub train_tasks: i64,
+    /// The seed of its training.
+    pub seed: i64,
+    /// How many parameters it has.
+    pub parameters: u64,
+    /// CPU-seconds of its training, where they were measured.
+    pub cpu_secs: Option<f64>,
+}
+
+/// What a stage of an experiment took.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StageCost {
+    /// Of which experiment.
+    pub experiment: String,
+    /// Which stage.
+    pub stage: String,
+    /// CPU-seconds of the process, all threads together.
+    pub cpu_secs: f64,
+    /// Seconds on the clock.
+    pub wall_secs: f64,
+}
+
 /// The losses of one program level at the end of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TrainingEnd {
+    /// Of which experiment.
+    pub experiment: String,
     /// The model's variant.
     pub variant: String,
+    /// How many tasks it was trained on.
+    pub train_tasks: i64,
     /// The seed of its training.
     pub seed: i64,
     /// The program level.
@@ -132,6 +207,8 @@ pub struct TrainingEnd {
 /// A line of the run's facts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Fact {
+    /// Of which experiment.
+    pub experiment: String,
     /// What is told.
     pub name: String,
     /// Its value, with its unit.

@@ -1,5 +1,6 @@
 //! What the expert would decide in an episode, and where a policy first differs.
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
 use crate::trace::{CallId, Episode, ProgramCall};
@@ -13,18 +14,24 @@ pub enum DivergenceKind {
     Argument,
     /// The same on another part of the demonstration.
     Scope,
-    /// The same, but the caller ended early or late.
-    End,
+    /// The caller ended before it should.
+    EarlyEnd,
+    /// The caller did not end when it should.
+    LateEnd,
 }
 
 impl DivergenceKind {
+    /// Every kind.
+    pub const ALL: [Self; 5] = [Self::Program, Self::Argument, Self::Scope, Self::EarlyEnd, Self::LateEnd];
+
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Program => "program",
             Self::Argument => "argument",
             Self::Scope => "scope",
-            Self::End => "end",
+            Self::EarlyEnd => "early_end",
+            Self::LateEnd => "late_end",
         }
     }
 }
@@ -61,6 +68,22 @@ pub fn expected_calls<'d>(demonstration: &'d Episode, scene: &Scene) -> Vec<&'d 
     expected
 }
 
+/// What of the expert's calls a policy is expected to decide.
+pub(super) fn expected_of(decisions: Decisions, demonstration: &Episode, scene: &Scene) -> Vec<ProgramCall> {
+    let calls = expected_calls(demonstration, scene).into_iter();
+    let whole = demonstration.calls.first().and_then(|root| root.output);
+    let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
+    match decisions {
+        Decisions::Scoped => calls.cloned().collect(),
+        Decisions::Unscoped => calls.cloned().map(unscoped).collect(),
+        Decisions::Primitives => {
+            let end_of_program = |call: &ProgramCall| call.program == Program::None;
+            let decided = calls.filter(|call| !call.program.is_composite());
+            decided.map(|call| ProgramCall { end_of_program: end_of_program(call), ..call.clone() }).collect()
+        }
+    }
+}
+
 /// A call and all below it, which follow it in the order of calling.
 fn subtree(calls: &[ProgramCall], position: usize) -> &[ProgramCall] {
     let depth = calls[position].depth;
@@ -74,7 +97,7 @@ pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall])
     let differing = decided.enumerate().find_map(|(decision, call)| {
         let kind = match expected.get(decision) {
             Some(wanted) => difference(call, wanted),
-            None => Some(DivergenceKind::End),
+            None => Some(DivergenceKind::LateEnd),
         };
         kind.map(|kind| (decision, call, kind))
     });
@@ -85,13 +108,17 @@ pub(super) fn first_divergence(calls: &[ProgramCall], expected: &[&ProgramCall])
 
 fn difference(call: &ProgramCall, wanted: &ProgramCall) -> Option<DivergenceKind> {
     if call.program != wanted.program {
-        Some(DivergenceKind::Program)
+        Some(match (call.program, wanted.program) {
+            (Program::None, _) => DivergenceKind::EarlyEnd,
+            (_, Program::None) => DivergenceKind::LateEnd,
+            _ => DivergenceKind::Program,
+        })
     } else if call.argument != wanted.argument {
         Some(DivergenceKind::Argument)
     } else if call.program.is_composite() && call.output != wanted.output {
         Some(DivergenceKind::Scope)
     } else if call.end_of_program != wanted.end_of_program {
-        Some(DivergenceKind::End)
+        Some(if call.end_of_program { DivergenceKind::EarlyEnd } else { DivergenceKind::LateEnd })
     } else {
         None
     }

@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::robot::{Action, RobotApi};
-use crate::rollout::divergence::first_divergence;
-use crate::rollout::{Decision, Divergence, Policy, Query, Specification, expected_calls};
+use crate::rollout::divergence::{expected_of, first_divergence};
+use crate::rollout::{Decision, Divergence, Policy, Query, Specification};
 use crate::task::{Task, goal_holds};
 use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, ProgramCall, Provenance, TraceError};
 
@@ -50,6 +51,8 @@ pub struct RolloutEpisode {
     pub decisions: u32,
     /// The first that differs from the expert's; `None` when none does.
     pub first_divergence: Option<Divergence>,
+    /// The decision whose primitive was the first that went wrong in physics; `None` when none did.
+    pub fault_decision: Option<u32>,
 }
 
 /// Acts all episodes to their ends. Physics of different episodes runs on the current rayon pool; the result does not
@@ -59,7 +62,8 @@ pub struct RolloutEpisode {
 ///
 /// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
 pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
-    let mut running: Vec<Running<'_>> = starts.into_iter().map(|start| Running::new(start, limits)).collect();
+    let mut running: Vec<Running<'_>> =
+        starts.into_iter().map(|start| Running::new(start, policy.decides(), limits)).collect();
     loop {
         let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
         if queries.is_empty() {
@@ -87,15 +91,16 @@ struct Running<'t> {
     max_decisions: u32,
     max_depth: u8,
     decisions: u32,
-    first_cause: Option<Cause>,
+    /// What first went wrong in physics, at which decision.
+    first_fault: Option<(u32, Cause)>,
     gave_up: bool,
 }
 
 impl<'t> Running<'t> {
-    fn new(start: Start<'t>, limits: Limits) -> Self {
+    fn new(start: Start<'t>, decisions: Decisions, limits: Limits) -> Self {
         let Start { task, demonstration, world, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expected: Vec<ProgramCall> = expected_calls(&demonstration, world.scene()).into_iter().cloned().collect();
+        let expected = expected_of(decisions, &demonstration, world.scene());
         let specification = Arc::new(Specification::of(&demonstration));
         Self {
             task,
@@ -108,7 +113,7 @@ impl<'t> Running<'t> {
             max_depth: limits.max_depth,
             expected,
             decisions: 0,
-            first_cause: None,
+            first_fault: None,
             gave_up: false,
         }
     }
@@ -131,6 +136,7 @@ impl<'t> Running<'t> {
     /// Carries out the pending decision.
     fn step(&mut self) {
         let Some(decision) = self.pending.take() else { return };
+        let number = self.decisions;
         self.decisions += 1;
         let Decision { program, scope, argument, end_of_program, prediction } = decision;
         let scope = (program != Program::None).then_some(scope);
@@ -139,7 +145,7 @@ impl<'t> Running<'t> {
         if let Some(action) = Action::new(program, argument)
             && let Err(cause) = self.world.act(action)
         {
-            self.first_cause.get_or_insert(cause);
+            self.first_fault.get_or_insert((number, cause));
         }
         if !program.is_composite() {
             self.calls.returned(self.frame());
@@ -155,10 +161,11 @@ impl<'t> Running<'t> {
     fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
         let at_rest = self.world.settle();
         let reached = goal_holds(self.world.scene(), &at_rest, &self.task.conditions);
+        let fault = self.first_fault.map(|(_, cause)| cause);
         let outcome = match (self.gave_up, reached) {
             (false, true) => Outcome::Success,
-            (false, false) => Outcome::Failure(self.first_cause.unwrap_or(Cause::EndedEarly)),
-            (true, _) => Outcome::Failure(self.first_cause.unwrap_or(Cause::NeverEnded)),
+            (false, false) => Outcome::Failure(fault.unwrap_or(Cause::EndedEarly)),
+            (true, _) => Outcome::Failure(fault.unwrap_or(Cause::NeverEnded)),
         };
         let frame = self.frame();
         let calls = self.calls.finish(frame);
@@ -173,6 +180,7 @@ impl<'t> Running<'t> {
             calls,
             outcome,
         })?;
-        Ok(RolloutEpisode { episode, decisions: self.decisions, first_divergence })
+        let fault_decision = self.first_fault.map(|(decision, _)| decision);
+        Ok(RolloutEpisode { episode, decisions: self.decisions, first_divergence, fault_decision })
     }
 }

@@ -13,9 +13,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use rayon::iter::{IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _};
+use rayon::iter::{
+    IndexedParallelIterator as _, IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _,
+};
 
-use crate::model::{self, AnyNetwork, Decoder, LabelScores, ModelConfig, ModelError, Network, Windows};
+use crate::model::{
+    self, CoreOutput, Decisions, Decoder, LabelScores, ModelConfig, ModelError, Network, NetworkUse, Windows,
+};
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, Query, Specification};
 use crate::scene::SlotIndex;
@@ -30,13 +34,23 @@ const END_THRESHOLD: f32 = 0.5;
 ///
 /// As [`model::load`].
 pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
-    let (config, network) = model::load(folder)?;
-    let name = config.variant.name();
-    let policy: Box<dyn Policy + Send> = match network {
-        AnyNetwork::ObjectCentric(network) => Box::new(LearnedPolicy::new(name, *network, decoder)),
-        AnyNetwork::Flattened(network) => Box::new(LearnedPolicy::new(name, *network, decoder)),
-    };
+    let config = model::load_config(folder)?;
+    let policy = model::load(folder, &config, Deciding { name: config.variant.name(), decoder })?;
     Ok((config, policy))
+}
+
+/// Makes a policy of a network.
+struct Deciding {
+    name: &'static str,
+    decoder: Decoder,
+}
+
+impl NetworkUse for Deciding {
+    type Output = Box<dyn Policy + Send>;
+
+    fn run<N: Network>(self, network: N) -> Self::Output {
+        Box::new(LearnedPolicy::new(self.name, network, self.decoder))
+    }
 }
 
 /// A network that decides.
@@ -46,6 +60,8 @@ pub struct LearnedPolicy<N: Network> {
     decoder: Decoder,
     /// By address, which the `Arc` in the value keeps from being given to another specification.
     demonstrations: HashMap<usize, Known<N::Demonstration>>,
+    /// What the running calls of each episode remember, from the root's up.
+    stacks: HashMap<usize, Vec<Option<N::Recall>>>,
 }
 
 /// What does not change in an episode, kept as long as its specification is in use.
@@ -57,7 +73,8 @@ struct Known<D> {
 impl<N: Network> LearnedPolicy<N> {
     /// A policy of the given name. The network is used without gradients.
     pub fn new(name: &str, network: N, decoder: Decoder) -> Self {
-        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations: HashMap::new() }
+        let (demonstrations, stacks) = (HashMap::new(), HashMap::new());
+        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations, stacks }
     }
 
     /// Reads the demonstrations of new episodes, and forgets those of episodes that are over.
@@ -82,27 +99,34 @@ impl<N: Network> LearnedPolicy<N> {
         self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
     }
 
-    fn decide_one(&self, query: &Query) -> Decision {
-        let Some(known) = self.demonstrations.get(&key(&query.specification)) else { return Decision::end(query) };
+    /// Takes what the running call remembers off its episode's stack. Calls above it have returned, and one that has
+    /// just begun remembers nothing.
+    fn recall(&mut self, query: &Query) -> Option<N::Recall> {
+        let stack = self.stacks.entry(query.episode).or_default();
+        stack.resize_with(usize::from(query.depth) + 1, || None);
+        stack.pop().flatten().filter(|_| query.step > 0)
+    }
+
+    fn decide_one(&self, query: &Query, recall: Option<N::Recall>) -> (Decision, Option<N::Recall>) {
+        let known = self.demonstrations.get(&key(&query.specification));
+        let Some(known) = known else { return (Decision::end(query), None) };
         let window = N::window(&known.demonstration, query.window);
         let reading = self.network.read(&window, &query.observation.to_flat());
-        let core = self.network.core(&reading, query.program);
+        let (core, recall) = self.network.core(&reading, query.program, &[1], recall);
+        (self.decision(query, &reading, &core), Some(recall))
+    }
+
+    fn decision(&self, query: &Query, reading: &N::Reading, core: &CoreOutput) -> Decision {
         let end_probability = logistic(values(core.end.clone()).first().copied().unwrap_or_default());
-        let programs = values(core.programs.clone());
-        let (program_idx, program_probability) = likeliest(&programs);
-        let program = Program::from_index(program_idx).unwrap_or(Program::None);
-        let labels: Vec<LabelScores> = if program.is_composite() {
-            let logits = values(self.network.scope(&reading, query.program));
-            logits.as_chunks::<{ ScopingLabel::ALL.len() }>().0.iter().map(log_probabilities).collect()
-        } else {
-            Vec::new()
-        };
+        let (program, program_probability) = likeliest_program(values(core.programs.clone()), N::DECISIONS);
+        let labels = program.is_composite().then(|| self.network.scope(reading, query.program, core)).flatten();
+        let labels: Vec<LabelScores> = labels.map(label_scores).unwrap_or_default();
         let scope = self
             .decoder
             .decode(&labels)
             .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
         let argument = program.takes_argument().then(|| {
-            let slots = values(self.network.argument(&reading, query.program, &core));
+            let slots = values(self.network.argument(reading, query.program, core));
             SlotIndex(likeliest(&slots).0 as u16)
         });
         let probabilities =
@@ -127,9 +151,20 @@ impl<N: Network> Policy for LearnedPolicy<N> {
         &self.name
     }
 
+    fn decides(&self) -> Decisions {
+        N::DECISIONS
+    }
+
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
         self.refresh(queries);
-        queries.par_iter().map(|query| self.decide_one(query)).collect()
+        let recalled: Vec<_> = queries.iter().map(|query| self.recall(query)).collect();
+        let decided: Vec<_> =
+            queries.par_iter().zip(recalled).map(|(query, recall)| self.decide_one(query, recall)).collect();
+        let remember = |(query, (decision, recall)): (&Query, (Decision, Option<N::Recall>))| {
+            self.stacks.entry(query.episode).or_default().push(recall);
+            decision
+        };
+        queries.iter().zip(decided).map(remember).collect()
     }
 }
 
@@ -143,6 +178,22 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 
 fn logistic(logit: f32) -> f32 {
     1.0 / (1.0 + (-logit).exp())
+}
+
+/// The likeliest program that may be called, and its probability among those.
+fn likeliest_program(mut logits: Vec<f32>, decisions: Decisions) -> (Program, f32) {
+    for (logit, program) in logits.iter_mut().zip(Program::ALL) {
+        if !decisions.may_call(program) {
+            *logit = f32::NEG_INFINITY;
+        }
+    }
+    let (idx, probability) = likeliest(&logits);
+    (Program::from_index(idx).unwrap_or(Program::None), probability)
+}
+
+/// Log-probabilities of each frame's labels.
+fn label_scores(logits: Tensor<3>) -> Vec<LabelScores> {
+    values(logits).as_chunks::<{ ScopingLabel::ALL.len() }>().0.iter().map(log_probabilities).collect()
 }
 
 /// The first of the largest logits, and its probability.

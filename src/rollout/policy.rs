@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{Episode, Observation, Prediction, Span};
@@ -65,7 +66,13 @@ pub trait Policy {
     /// The variant's name, as in reports.
     fn name(&self) -> &str;
 
-    /// One decision a query, in order. Must not depend on which queries come together.
+    /// What it decides.
+    fn decides(&self) -> Decisions {
+        Decisions::Scoped
+    }
+
+    /// One decision a query, in order. Must not depend on which queries come together, but may on earlier ones of the
+    /// same running call.
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;
 }
 

@@ -12,6 +12,19 @@ pub struct RolloutRows {
     rows: Vec<RolloutRow>,
 }
 
+/// Who acted the episodes of a table, beside the name that is in each.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Acted {
+    /// The seed of the model's training; 0 for an oracle.
+    pub training_seed: u64,
+    /// How many tasks it was trained on; `None` for an oracle.
+    pub train_tasks: Option<u32>,
+    /// What a demonstration is given as: `trajectories`; `None` for an oracle.
+    pub specification: Option<&'static str>,
+    /// How scopes are decoded; `None` for an oracle.
+    pub decoder: Option<&'static str>,
+}
+
 /// The columns of schemas/parquet/rollouts.message.
 #[derive(Clone, Debug, PartialEq)]
 struct RolloutRow {
@@ -30,12 +43,16 @@ struct RolloutRow {
     divergence_kind: Option<String>,
     divergence_program: Option<String>,
     sim_secs: f64,
+    train_tasks: Option<i64>,
+    specification: Option<String>,
+    decoder: Option<String>,
+    fault_decision: Option<i64>,
 }
 
 impl RolloutRows {
     /// The rows of a suite's episodes.
-    pub fn of(suite: &str, training_seed: u64, acted: &[RolloutEpisode]) -> Self {
-        Self { rows: acted.iter().map(|rollout| RolloutRow::of(suite, training_seed, rollout)).collect() }
+    pub fn of(suite: &str, by: &Acted, rollouts: &[RolloutEpisode]) -> Self {
+        Self { rows: rollouts.iter().map(|rollout| RolloutRow::of(suite, by, rollout)).collect() }
     }
 
     /// Adds rows at the end.
@@ -69,6 +86,7 @@ impl RolloutRows {
             Column::OptionalText(rows.iter().map(|row| get(row).clone()).collect())
         };
         let int = |get: fn(&RolloutRow) -> i64| Column::Int64(rows.iter().map(get).collect());
+        let optional_int = |get: fn(&RolloutRow) -> Option<i64>| Column::OptionalInt64(rows.iter().map(get).collect());
         let columns = vec![
             ("variant", text(|row| &row.variant)),
             ("suite", text(|row| &row.suite)),
@@ -81,10 +99,14 @@ impl RolloutRows {
             ("cause", optional(|row| &row.cause)),
             ("calls", int(|row| row.calls)),
             ("decisions", int(|row| row.decisions)),
-            ("first_divergence", Column::OptionalInt64(rows.iter().map(|row| row.first_divergence).collect())),
+            ("first_divergence", optional_int(|row| row.first_divergence)),
             ("divergence_kind", optional(|row| &row.divergence_kind)),
             ("divergence_program", optional(|row| &row.divergence_program)),
             ("sim_secs", Column::Float64(rows.iter().map(|row| row.sim_secs).collect())),
+            ("train_tasks", optional_int(|row| row.train_tasks)),
+            ("specification", optional(|row| &row.specification)),
+            ("decoder", optional(|row| &row.decoder)),
+            ("fault_decision", optional_int(|row| row.fault_decision)),
         ];
         table::write(path, &TableSchema::ROLLOUTS, columns)
     }
@@ -111,6 +133,10 @@ impl RolloutRows {
         let mut divergence_kind = columns.optional_text("divergence_kind")?.into_iter();
         let mut divergence_program = columns.optional_text("divergence_program")?.into_iter();
         let mut sim_secs = columns.float64("sim_secs")?.into_iter();
+        let mut train_tasks = columns.optional_int64("train_tasks")?.into_iter();
+        let mut specification = columns.optional_text("specification")?.into_iter();
+        let mut decoder = columns.optional_text("decoder")?.into_iter();
+        let mut fault_decision = columns.optional_int64("fault_decision")?.into_iter();
         let mut next = || {
             Some(RolloutRow {
                 variant: variant.next()?,
@@ -128,6 +154,10 @@ impl RolloutRows {
                 divergence_kind: divergence_kind.next()?,
                 divergence_program: divergence_program.next()?,
                 sim_secs: sim_secs.next()?,
+                train_tasks: train_tasks.next()?,
+                specification: specification.next()?,
+                decoder: decoder.next()?,
+                fault_decision: fault_decision.next()?,
             })
         };
         Ok(Self { rows: std::iter::from_fn(&mut next).collect() })
@@ -135,14 +165,14 @@ impl RolloutRows {
 }
 
 impl RolloutRow {
-    fn of(suite: &str, training_seed: u64, rollout: &RolloutEpisode) -> Self {
-        let RolloutEpisode { episode, decisions, first_divergence } = rollout;
+    fn of(suite: &str, by: &Acted, rollout: &RolloutEpisode) -> Self {
+        let RolloutEpisode { episode, decisions, first_divergence, fault_decision } = rollout;
         let provenance = &episode.provenance;
         let last_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
         Self {
             variant: provenance.actor.name().to_owned(),
             suite: suite.to_owned(),
-            training_seed: training_seed as i64,
+            training_seed: by.training_seed as i64,
             episode: provenance.index as i64,
             task_id: provenance.task_id.clone(),
             split: provenance.split.name().to_owned(),
@@ -155,6 +185,10 @@ impl RolloutRow {
             divergence_kind: first_divergence.map(|divergence| divergence.kind.name().to_owned()),
             divergence_program: first_divergence.map(|divergence| divergence.program.name().to_owned()),
             sim_secs: last_nanos as f64 / 1e9,
+            train_tasks: by.train_tasks.map(i64::from),
+            specification: by.specification.map(str::to_owned),
+            decoder: by.decoder.map(str::to_owned),
+            fault_decision: fault_decision.map(i64::from),
         }
     }
 }

@@ -26,6 +26,8 @@ pub struct Part {
     pub level_idx: usize,
     /// The running program.
     pub program: Program,
+    /// How its decisions follow one another: see [`crate::model::Network`].
+    pub steps: Vec<usize>,
     /// What it sees of the demonstrations.
     pub windows: Windows,
     /// What is seen now, an observation row each.
@@ -50,33 +52,66 @@ struct Prepared {
     argument: Option<usize>,
 }
 
-/// Draws a mini-batch of a level. It depends on nothing but its arguments.
+/// Decisions of one call that are learned together, all with the same window.
+struct Run {
+    decisions: Vec<Prepared>,
+}
+
+impl Run {
+    fn window_len(&self) -> usize {
+        self.decisions.first().map_or(0, |prepared| prepared.example.window.len())
+    }
+
+    fn n_frames(&self) -> usize {
+        self.window_len() * self.decisions.len()
+    }
+}
+
+/// Draws a mini-batch of a level, of `size` decisions or, where they come in calls, a few more. It depends on nothing
+/// but its arguments.
 pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, size: usize, seed: Seed) -> Vec<Part> {
     let mut rng = seed.rng();
-    let mut drawn: Vec<Prepared> = (0..size)
-        .map(|_| {
-            let example = examples.draw(level_idx, config.pairing, &mut rng);
-            prepare(examples, config, example, &mut rng)
-        })
-        .collect();
-    drawn.sort_by_key(|prepared| prepared.example.window.len());
-    let n_frames: usize = drawn.iter().map(|prepared| prepared.example.window.len()).sum();
-    let middle = if n_frames > SPLIT_FRAMES { balanced(&drawn, n_frames) } else { drawn.len() };
-    let counts = Counts::of(&drawn);
-    let (short, long) = drawn.split_at(middle);
-    let parts = [long, short].into_iter().filter(|part| !part.is_empty());
+    let mut runs: Vec<Run> = Vec::new();
+    let mut n_drawn = 0;
+    while n_drawn < size {
+        let run = examples.draw(level_idx, config.pairing, &mut rng);
+        n_drawn += run.len();
+        runs.push(prepare_run(examples, config, run, &mut rng));
+    }
+    runs.sort_by_key(Run::window_len);
+    let n_frames: usize = runs.iter().map(Run::n_frames).sum();
+    let middle = if n_frames > SPLIT_FRAMES { balanced(&runs, n_frames) } else { runs.len() };
+    let counts = Counts::of(runs.iter().flat_map(|run| &run.decisions));
+    let long = runs.split_off(middle);
+    let parts = [long, runs].into_iter().filter(|part| !part.is_empty());
     parts.map(|part| assemble(examples, level_idx, part, counts)).collect()
 }
 
-/// Where to split windows that are sorted by length so that both parts have about as many frames.
-fn balanced(drawn: &[Prepared], n_frames: usize) -> usize {
+/// Where to split runs that are sorted by the length of their windows so that both parts have about as many frames.
+fn balanced(runs: &[Run], n_frames: usize) -> usize {
     let mut before = 0;
-    let lengths = drawn.iter().map(|prepared| prepared.example.window.len());
-    let short = lengths.take_while(|length| {
-        before += length;
+    let frames = runs.iter().map(Run::n_frames);
+    let short = frames.take_while(|frames| {
+        before += frames;
         2 * before <= n_frames
     });
     short.count()
+}
+
+/// Step by step: the first decision of every run, then the second of those that have one, and so on, with the longest
+/// runs first; and how many there are of each.
+fn packed(mut runs: Vec<Run>) -> (Vec<Prepared>, Vec<usize>) {
+    runs.sort_by_key(|run| std::cmp::Reverse(run.decisions.len()));
+    let mut rest: Vec<_> = runs.into_iter().map(|run| run.decisions.into_iter()).collect();
+    let (mut decisions, mut steps) = (Vec::new(), Vec::new());
+    loop {
+        let step: Vec<Prepared> = rest.iter_mut().filter_map(Iterator::next).collect();
+        if step.is_empty() {
+            return (decisions, steps);
+        }
+        steps.push(step.len());
+        decisions.extend(step);
+    }
 }
 
 /// How many labels a mini-batch has.
@@ -88,14 +123,24 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(drawn: &[Prepared]) -> Self {
-        let scoped = drawn.iter().filter(|prepared| prepared.example.scope.is_some());
+    fn of<'d>(drawn: impl Iterator<Item = &'d Prepared> + Clone) -> Self {
+        let scoped = drawn.clone().filter(|prepared| prepared.example.scope.is_some());
         Self {
-            examples: drawn.len(),
+            examples: drawn.clone().count(),
             scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
-            arguments: drawn.iter().filter(|prepared| prepared.argument.is_some()).count(),
+            arguments: drawn.filter(|prepared| prepared.argument.is_some()).count(),
         }
     }
+}
+
+/// Augments the decisions of a run all in the same way: they are moments of one world.
+fn prepare_run(examples: &Examples<'_>, config: &TrainConfig, run: Vec<Example>, rng: &mut (impl Rng + Clone)) -> Run {
+    let at_first = rng.clone();
+    let prepare = |example| {
+        *rng = at_first.clone();
+        prepare(examples, config, example, rng)
+    };
+    Run { decisions: run.into_iter().map(prepare).collect() }
 }
 
 fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Prepared {
@@ -113,7 +158,8 @@ fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng:
     Prepared { example, window, state, argument }
 }
 
-fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts: Counts) -> Part {
+fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
+    let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
     let windows = Windows::new(n_slots, &slices);
@@ -130,10 +176,11 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts
         part.iter().flat_map(|prepared| one_hot(n_slots, prepared.argument, value)).collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
-    let scopes = scoped.then(|| scope_targets(part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
+    let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
     Part {
         level_idx,
         program: examples.levels().nth(level_idx).map_or(Program::None, |(program, _)| program),
+        steps,
         windows,
         states: part.iter().flat_map(|prepared| &prepared.state).copied().collect(),
         programs,

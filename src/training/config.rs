@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::Variant;
+use crate::model::{EncoderKind, Variant};
 use crate::training::TrainError;
 
 /// What is trained, and how.
@@ -22,9 +22,9 @@ impl Training {
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
-        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant {
-            Variant::Ntp => (0.003, 0.0, 0.2),
-            Variant::NtpPaper => (0.002, 1.0, 0.0),
+        let (learning_rate, relabel_slots, gripper_jitter) = match self.variant.encoder() {
+            EncoderKind::ObjectCentric => (0.003, 0.0, 0.2),
+            EncoderKind::Flattened => (0.002, 1.0, 0.0),
         };
         let config = TrainConfig {
             learning_rate: self.config.learning_rate.or(Some(learning_rate)),

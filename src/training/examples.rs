@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use rand::Rng;
 
 use crate::dataset::{DatasetTrials, TrialData};
+use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::task::Split;
@@ -49,10 +50,21 @@ pub struct Example {
     pub last_decision: bool,
 }
 
+/// What is drawn at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grain {
+    /// A decision, whichever.
+    Decision,
+    /// All decisions of a call, in order, for a network that remembers.
+    Call,
+}
+
 /// The trials of a dataset, indexed for drawing.
 #[derive(Debug)]
 pub struct Examples<'d> {
     data: &'d DatasetTrials,
+    decisions: Decisions,
+    grain: Grain,
     trees: Vec<CallTree>,
     /// Positions of the training trials, by task.
     tasks: Vec<Vec<usize>>,
@@ -74,21 +86,30 @@ struct CallTree {
     callees: Vec<Vec<usize>>,
     /// Arguments of the moves below each callee of the root.
     signatures: BTreeMap<usize, Vec<SlotIndex>>,
-    /// Calls by the program that decided on them.
-    decisions: BTreeMap<Program, Vec<usize>>,
+    /// Calls by the program that decided on them, those of one running call together.
+    decisions: BTreeMap<Program, Vec<Vec<usize>>>,
 }
 
 impl<'d> Examples<'d> {
-    /// Indexes a dataset.
+    /// Indexes a dataset for single decisions of NTP.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::of`].
+    pub fn new(data: &'d DatasetTrials) -> Result<Self, TrainError> {
+        Self::of(data, Decisions::Scoped, Grain::Decision)
+    }
+
+    /// Indexes a dataset for what a model decides.
     ///
     /// # Errors
     ///
     /// [`TrainError::NoTrials`] without a training trial; [`TrainError::Trial`] when one does not fit together.
-    pub fn new(data: &'d DatasetTrials) -> Result<Self, TrainError> {
+    pub fn of(data: &'d DatasetTrials, decisions: Decisions, grain: Grain) -> Result<Self, TrainError> {
         let mut by_task: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
         let mut trees = Vec::new();
         for (position, trial) in data.trials.iter().enumerate() {
-            trees.push(CallTree::new(trial, data.n_slots)?);
+            trees.push(CallTree::new(trial, data.n_slots, decisions)?);
             if trial.split == Split::Seen {
                 by_task.entry(&trial.task_id).or_default().push(position);
             }
@@ -110,7 +131,7 @@ impl<'d> Examples<'d> {
                 }
             }
         }
-        Ok(Self { data, trees, tasks, levels: levels.into_values().collect() })
+        Ok(Self { data, decisions, grain, trees, tasks, levels: levels.into_values().collect() })
     }
 
     /// The programs that decide, in the order of the program memory, and whether each is a root.
@@ -123,22 +144,24 @@ impl<'d> Examples<'d> {
         self.data
     }
 
-    /// Draws a decision of a level: a task, a trial of it, a decision in it, and the demonstration beside it.
-    pub fn draw(&self, level_idx: usize, pairing: Pairing, rng: &mut impl Rng) -> Example {
+    /// Draws of a level: a task, a trial of it, a decision in it or all of a call, and the demonstration beside it.
+    pub fn draw(&self, level_idx: usize, pairing: Pairing, rng: &mut impl Rng) -> Vec<Example> {
         let level = &self.levels[level_idx];
         loop {
             let trials = &self.tasks[level.tasks[rng.random_range(0..level.tasks.len())]];
             let own = rng.random_range(0..trials.len());
             let Some(decisions) = self.trees[trials[own]].decisions.get(&level.program) else { continue };
-            let call = decisions[rng.random_range(0..decisions.len())];
+            let run = self.grain.draw(decisions, rng);
             let other = match pairing {
                 Pairing::Cross if trials.len() > 1 => (own + rng.random_range(1..trials.len())) % trials.len(),
                 Pairing::Cross | Pairing::Own => own,
             };
             // Without such a sub-task in the demonstration (a count of zero), the trial's own has it.
-            let paired = self.example(trials[own], call, trials[other]);
-            if let Some(example) = paired.or_else(|| self.example(trials[own], call, trials[own])) {
-                return example;
+            let paired = |demonstration: usize| -> Option<Vec<Example>> {
+                run.iter().map(|&call| self.example(trials[own], call, demonstration)).collect()
+            };
+            if let Some(examples) = paired(trials[other]).or_else(|| paired(trials[own])) {
+                return examples;
             }
         }
     }
@@ -148,11 +171,16 @@ impl<'d> Examples<'d> {
     pub fn example(&self, trial: usize, call: usize, demonstration: usize) -> Option<Example> {
         let calls = &self.data.trials[trial].calls;
         let decided = calls.get(call)?;
-        let own_caller = decided.caller?.0 as usize;
-        let caller = self.matching(trial, own_caller, demonstration)?;
+        let own_caller = match self.decisions {
+            Decisions::Primitives => 0,
+            Decisions::Scoped | Decisions::Unscoped => decided.caller?.0 as usize,
+        };
         let demonstrated = &self.data.trials[demonstration].calls;
-        let window = demonstrated[caller].output?;
-        let scope = if decided.program.is_composite() {
+        let window = match self.decisions {
+            Decisions::Scoped => demonstrated[self.matching(trial, own_caller, demonstration)?].output?,
+            Decisions::Unscoped | Decisions::Primitives => demonstrated[0].output?,
+        };
+        let scope = if self.decisions.has_scopes() && decided.program.is_composite() {
             let part = demonstrated[self.matching(trial, call, demonstration)?].output?;
             Some(Span { begin: part.begin - window.begin, end: part.end - window.begin })
         } else {
@@ -165,7 +193,10 @@ impl<'d> Examples<'d> {
             trial,
             frame: decided.frames.begin as usize,
             callee: decided.program,
-            end_of_program: decided.end_of_program,
+            end_of_program: match self.decisions {
+                Decisions::Primitives => decided.program == Program::None,
+                Decisions::Scoped | Decisions::Unscoped => decided.end_of_program,
+            },
             scope,
             argument: decided.argument,
             next_move: next.filter(|call| call.program == Program::MoveTo).and_then(|call| call.argument),
@@ -191,21 +222,53 @@ impl<'d> Examples<'d> {
     }
 }
 
+impl Grain {
+    /// The calls that one draw takes of the calls that a program decided on.
+    fn draw(self, decisions: &[Vec<usize>], rng: &mut impl Rng) -> Vec<usize> {
+        match self {
+            Self::Decision => {
+                let n_decisions: usize = decisions.iter().map(Vec::len).sum();
+                let nth = rng.random_range(0..n_decisions);
+                decisions.iter().flatten().skip(nth).take(1).copied().collect()
+            }
+            Self::Call => decisions[rng.random_range(0..decisions.len())].clone(),
+        }
+    }
+}
+
 impl CallTree {
-    fn new(trial: &TrialData, n_slots: usize) -> Result<Self, TrainError> {
+    fn new(trial: &TrialData, n_slots: usize, decisions: Decisions) -> Result<Self, TrainError> {
         check(trial, n_slots)?;
         let calls = &trial.calls;
         let mut callees = vec![Vec::new(); calls.len()];
-        let mut decisions: BTreeMap<Program, Vec<usize>> = BTreeMap::new();
         for (position, call) in calls.iter().enumerate() {
             if let Some(caller) = call.caller {
                 callees[caller.0 as usize].push(position);
-                decisions.entry(calls[caller.0 as usize].program).or_default().push(position);
             }
         }
         let signatures = callees[0].iter().map(|&position| (position, moves_below(calls, position))).collect();
+        let decisions = match decisions {
+            Decisions::Primitives => BTreeMap::from([(calls[0].program, vec![without_hierarchy(calls)])]),
+            Decisions::Scoped | Decisions::Unscoped => by_program(calls, &callees),
+        };
         Ok(Self { callees, signatures, decisions })
     }
+}
+
+/// The calls of each running call, by its program.
+fn by_program(calls: &[ProgramCall], callees: &[Vec<usize>]) -> BTreeMap<Program, Vec<Vec<usize>>> {
+    let mut decisions: BTreeMap<Program, Vec<Vec<usize>>> = BTreeMap::new();
+    for (call, callees) in calls.iter().zip(callees).filter(|(_, callees)| !callees.is_empty()) {
+        decisions.entry(call.program).or_default().push(callees.clone());
+    }
+    decisions
+}
+
+/// What moves the robot, in order, and the step that ends the root.
+fn without_hierarchy(calls: &[ProgramCall]) -> Vec<usize> {
+    let is_decided =
+        |call: &ProgramCall| call.program.is_primitive() || (call.program == Program::None && call.depth == 1);
+    (0..calls.len()).filter(|&position| is_decided(&calls[position])).collect()
 }
 
 /// Arguments of the moves below a call. What is below it follows it in the order of calling.

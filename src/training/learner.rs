@@ -138,16 +138,17 @@ pub fn losses<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Lo
     let n_batch = part.ends.len();
     let demonstration = network.demonstration(&part.windows);
     let reading = network.read(&demonstration, &part.states);
-    let core = network.core(&reading, part.program);
+    let (core, _) = network.core(&reading, part.program, &part.steps, None);
     let programs = TensorData::new(part.programs.clone(), [n_batch, Program::ALL.len()]);
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
     let ends = Tensor::from_data(TensorData::new(part.ends.clone(), [n_batch, 1]), &device);
     let end = binary_cross_entropy(core.end.clone(), ends).mul_scalar(part.weight);
     let mut total = program.clone().mul_scalar(weights.program) + end.clone().mul_scalar(weights.end);
-    let scope = part.scopes.as_ref().map(|targets| {
+    let labels = part.scopes.as_ref().and_then(|_| network.scope(&reading, part.program, &core));
+    let scope = part.scopes.as_ref().zip(labels).map(|(targets, labels)| {
         let shape = [n_batch, part.windows.n_frames(), ScopingLabel::ALL.len()];
         let targets = Tensor::<3>::from_data(TensorData::new(targets.clone(), shape), &device);
-        cross_entropy(network.scope(&reading, part.program), targets)
+        cross_entropy(labels, targets)
     });
     let argument = part.arguments.as_ref().map(|targets| {
         let targets = TensorData::new(targets.clone(), [n_batch, part.windows.n_slots()]);

@@ -29,6 +29,8 @@ mod schemas_parquet;
 #[cfg(test)]
 mod sim;
 #[cfg(test)]
+mod study;
+#[cfg(test)]
 mod table;
 #[cfg(test)]
 mod task;

@@ -1,12 +1,11 @@
 //! Networks, decoders, model folders and the learned policy.
 
-use burn::module::Module as _;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    CONFIG_FILE, Decoder, Flattened, FlattenedConfig, LabelScores, ModelConfig, ModelError, Network, ObjectCentric,
-    ObjectCentricConfig, ProgramMemory, ScopeHead, Variant, WEIGHTS_FILE, Windows, check_purpose, load, span_score,
-    weights_to_bytes,
+    CONFIG_FILE, Cell, Decisions, Decoder, Flattened, FlattenedConfig, Gru, LabelScores, Lstm, ModelConfig, ModelError,
+    Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory, ScopeHead, Variant,
+    WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
@@ -22,12 +21,22 @@ fn device() -> Device {
     Device::flex()
 }
 
-fn object_centric(seed: u64) -> ObjectCentric {
-    ObjectCentric::new(&ObjectCentricConfig::default(), Seed(seed), &device())
+fn object_centric(seed: u64) -> Ntp<ObjectCentric> {
+    Ntp::new(&ObjectCentricConfig::default(), 8, Seed(seed), &device())
 }
 
-fn flattened(seed: u64) -> Flattened {
-    Flattened::new(&FlattenedConfig::default(), 8, Seed(seed), &device())
+fn flattened(seed: u64) -> Ntp<Flattened> {
+    Ntp::new(&FlattenedConfig::default(), 8, Seed(seed), &device())
+}
+
+fn recurrent(seed: u64) -> NtpGru<ObjectCentric> {
+    NtpGru::new(&ObjectCentricConfig::default(), 8, Seed(seed), &device())
+}
+
+/// Does something with a fresh network of every variant.
+fn with_every<U: NetworkUse>(mut wanted: impl FnMut(Variant) -> U) -> Vec<(Variant, U::Output)> {
+    let network = |variant| (variant, with_network(&config(variant), Seed(1), &device(), wanted(variant)));
+    Variant::ALL.into_iter().map(network).collect()
 }
 
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
@@ -57,11 +66,11 @@ struct Said {
 fn say(network: &impl Network, n_slots: usize, windows: &[&[f32]], states: &[f32], program: Program) -> Said {
     let demonstration = network.demonstration(&Windows::new(n_slots, windows));
     let reading = network.read(&demonstration, states);
-    let core = network.core(&reading, program);
+    let (core, _) = network.core(&reading, program, &[windows.len()], None);
     Said {
         programs: values(core.programs.clone()),
         ends: values(core.end.clone()),
-        scopes: values(network.scope(&reading, program)),
+        scopes: network.scope(&reading, program, &core).map(values).unwrap_or_default(),
         arguments: values(network.argument(&reading, program, &core)),
     }
 }
@@ -74,15 +83,40 @@ fn assert_near(found: &[f32], expected: &[f32]) {
     }
 }
 
+struct Parameters;
+
+impl NetworkUse for Parameters {
+    type Output = usize;
+
+    fn run<N: Network>(self, network: N) -> usize {
+        network.num_params()
+    }
+}
+
 #[test]
 fn parameter_counts_are_what_they_were() {
-    assert_eq!(object_centric(0).num_params(), 23_950);
-    assert_eq!(flattened(0).num_params(), 251_213);
+    let counts: Vec<(&str, usize)> =
+        with_every(|_| Parameters).into_iter().map(|(variant, count)| (variant.name(), count)).collect();
+    assert_eq!(
+        counts,
+        [
+            ("ntp", 23_950),
+            ("ntp_paper", 251_213),
+            ("ntp_gru", 30_222),
+            ("ntp_gru_paper", 307_085),
+            ("ntp_no_scope", 20_138),
+            ("ntp_no_scope_paper", 229_225),
+            ("flat", 20_138),
+            ("flat_paper", 229_225),
+            ("flat_gru", 26_474),
+            ("flat_gru_paper", 285_097),
+        ]
+    );
 }
 
 #[test]
 fn the_same_seed_gives_the_same_parameters() {
-    let bytes = |network: &ObjectCentric| weights_to_bytes(network, "x".as_ref()).unwrap();
+    let bytes = |network: &Ntp<ObjectCentric>| weights_to_bytes(network, "x".as_ref()).unwrap();
     assert_eq!(bytes(&object_centric(1)), bytes(&object_centric(1)));
     assert_ne!(bytes(&object_centric(1)), bytes(&object_centric(2)));
 }
@@ -104,10 +138,6 @@ fn program_memory_scores_by_the_product_of_keys() {
 /// With context 0.5 the frames 1 and -1 give hidden 2.5 and 0.
 #[test]
 fn the_scoping_head_computes_what_it_says() {
-    let linear = |weight: Tensor<2>, bias: Option<Vec<f32>>| Linear {
-        weight: burn::module::Param::from_tensor(weight),
-        bias: bias.map(|bias| burn::module::Param::from_data(bias.as_slice(), &device())),
-    };
     let head = ScopeHead::from_layers(
         linear(Tensor::from_data([[2.0_f32]], &device()), None),
         linear(Tensor::from_data([[3.0_f32]], &device()), Some(vec![-1.0])),
@@ -118,21 +148,102 @@ fn the_scoping_head_computes_what_it_says() {
     assert_near(&values(head.forward(frames, context)), &[2.5, -2.5, 1.25, 0.25, 0.0, 0.0, 0.0, 0.25]);
 }
 
-fn check_padding(network: &impl Network) {
-    let (short, long) = (rows(3, 8, 1), rows(7, 8, 2));
-    let states = rows(2, 8, 3);
-    let together = say(network, 8, &[&short, &long], &states, Program::Pick);
-    let alone = say(network, 8, &[&short], &states[..26], Program::Pick);
-    assert_near(&together.programs[..Program::ALL.len()], &alone.programs);
-    assert_near(&together.ends[..1], &alone.ends);
-    assert_near(&together.scopes[..3 * 4], &alone.scopes);
-    assert_near(&together.arguments[..8], &alone.arguments);
+struct Padding;
+
+impl NetworkUse for Padding {
+    type Output = ();
+
+    fn run<N: Network>(self, network: N) {
+        let (short, long) = (rows(3, 8, 1), rows(7, 8, 2));
+        let states = rows(2, 8, 3);
+        let together = say(&network, 8, &[&short, &long], &states, Program::Pick);
+        let alone = say(&network, 8, &[&short], &states[..26], Program::Pick);
+        assert_near(&together.programs[..Program::ALL.len()], &alone.programs);
+        assert_near(&together.ends[..1], &alone.ends);
+        assert_near(&together.scopes[..alone.scopes.len()], &alone.scopes);
+        assert_near(&together.arguments[..8], &alone.arguments);
+    }
 }
 
 #[test]
 fn padding_changes_nothing_within_a_window() {
-    check_padding(&object_centric(1));
-    check_padding(&flattened(1));
+    with_every(|_| Padding);
+}
+
+/// What a network says of the steps of two calls of 3 and 1 steps, packed, and one after another.
+struct Packing;
+
+impl NetworkUse for Packing {
+    type Output = bool;
+
+    fn run<N: Network>(self, network: N) -> bool {
+        let (window, states) = (rows(5, 8, 1), rows(4, 8, 3));
+        // Rows 0, 2 and 3 are the first call's, row 1 the second's.
+        let demonstration = network.demonstration(&Windows::new(8, &[window.as_slice(); 4]));
+        let reading = network.read(&demonstration, &states);
+        let (packed, _) = network.core(&reading, Program::Pick, &[2, 1, 1], None);
+        let packed = values(packed.programs);
+        let mut recall = None;
+        let mut alone = Vec::new();
+        for step in [0, 2, 3] {
+            let demonstration = network.demonstration(&Windows::new(8, &[&window]));
+            let reading = network.read(&demonstration, &states[step * 26..(step + 1) * 26]);
+            let (core, remembered) = network.core(&reading, Program::Pick, &[1], recall.take());
+            recall = Some(remembered);
+            let programs = values(core.programs);
+            assert_near(&programs, &packed[step * Program::ALL.len()..][..Program::ALL.len()]);
+            alone.push(programs);
+        }
+        let (afresh, _) = network.core(
+            &network.read(&network.demonstration(&Windows::new(8, &[&window])), &states[2 * 26..3 * 26]),
+            Program::Pick,
+            &[1],
+            None,
+        );
+        values(afresh.programs).iter().zip(&alone[1]).any(|(a, b)| (a - b).abs() > 1e-6)
+    }
+}
+
+#[test]
+fn packed_steps_are_the_same_as_steps_one_by_one_and_only_recurrent_networks_remember() {
+    for (variant, remembers) in with_every(|_| Packing) {
+        let is_recurrent = variant.name().contains("gru") || variant.name().contains("npi");
+        assert_eq!(remembers, is_recurrent, "{variant}");
+    }
+}
+
+fn linear(weight: Tensor<2>, bias: Option<Vec<f32>>) -> Linear {
+    Linear {
+        weight: burn::module::Param::from_tensor(weight),
+        bias: bias.map(|bias| burn::module::Param::from_data(bias.as_slice(), &device())),
+    }
+}
+
+/// x = 1, h = 0.5, W = (1, -1, 2) with bias (0, 0, 0.5), U = (2, 0, 3):
+/// z = sigmoid(1 + 1) = 0.880797, r = sigmoid(-1) = 0.268941, n = tanh(2.5 + 0.268941 * 1.5) = 0.994033,
+/// h' = (1 - z) n + 0.5 z = 0.118492 + 0.440399 = 0.558890.
+#[test]
+fn the_gru_computes_what_it_says() {
+    let cell = Gru::from_layers(
+        linear(Tensor::from_data([[1.0_f32, -1.0, 2.0]], &device()), Some(vec![0.0, 0.0, 0.5])),
+        linear(Tensor::from_data([[2.0_f32, 0.0, 3.0]], &device()), None),
+    );
+    let hidden = cell.step(Tensor::from_data([[1.0_f32]], &device()), Tensor::from_data([[0.5_f32]], &device()));
+    assert_near(&values(Gru::hidden(&hidden)), &[0.558_890]);
+}
+
+/// x = 1, h = 0.5, c = 2, W = (1, 0, -1, 0.5), U = (0, 2, 0, 1):
+/// i = sigmoid(1) = 0.731059, f = sigmoid(1) = 0.731059, o = sigmoid(-1) = 0.268941, g = tanh(1) = 0.761594,
+/// c' = 1.462117 + 0.556770 = 2.018887, h' = 0.268941 * tanh(2.018887) = 0.259619.
+#[test]
+fn the_lstm_computes_what_it_says() {
+    let tensor = |row: f32| Tensor::<2>::from_data([[row]], &device());
+    let cell = Lstm::from_layers(
+        linear(Tensor::from_data([[1.0_f32, 0.0, -1.0, 0.5]], &device()), None),
+        linear(Tensor::from_data([[0.0_f32, 2.0, 0.0, 1.0]], &device()), None),
+    );
+    let [hidden, memory] = cell.step(tensor(1.0), [tensor(0.5), tensor(2.0)]);
+    assert_near(&[values(hidden), values(memory)].concat(), &[0.259_619, 2.018_887]);
 }
 
 #[test]
@@ -140,8 +251,10 @@ fn a_cut_demonstration_reads_as_its_part_alone() {
     let (network, all) = (object_centric(1), rows(9, 8, 4));
     let state = rows(1, 8, 5);
     let demonstration = network.demonstration(&Windows::new(8, &[&all]));
-    let window = ObjectCentric::window(&demonstration, Span { begin: 2, end: 6 });
-    let cut = values(network.scope(&network.read(&window, &state), Program::PickAndPlace));
+    let window = Ntp::<ObjectCentric>::window(&demonstration, Span { begin: 2, end: 6 });
+    let reading = network.read(&window, &state);
+    let (core, _) = network.core(&reading, Program::PickAndPlace, &[1], None);
+    let cut = values(network.scope(&reading, Program::PickAndPlace, &core).unwrap());
     let alone = say(&network, 8, &[&all[2 * 26..6 * 26]], &state, Program::PickAndPlace);
     assert_near(&cut, &alone.scopes);
 }
@@ -258,7 +371,7 @@ fn a_model_of_another_kind_is_refused_with_its_path() {
     let weights = weights_to_bytes(&object_centric(0), folder.path()).unwrap();
     let refused = |config: &ModelConfig, weights: &[u8]| {
         store(folder.path(), config, weights);
-        let error = load(folder.path()).unwrap_err();
+        let error = inspect(folder.path()).unwrap_err();
         assert!(error.to_string().contains(&folder.path().display().to_string()), "{error}");
         error
     };
@@ -306,24 +419,38 @@ fn queries() -> Vec<Query> {
     (0..24).map(|episode| query((episode, programs[episode % 4]))).collect()
 }
 
-fn check_lawful(query: &Query, decision: &Decision) {
+fn check_lawful(query: &Query, decision: &Decision, decisions: Decisions) {
     assert!(query.window.contains(decision.scope) && !decision.scope.is_empty());
     assert_eq!(decision.argument.is_some(), decision.program == Program::MoveTo);
     assert!(decision.program != Program::None || decision.end_of_program);
-    assert!(decision.program.is_composite() || decision.scope == query.window);
+    let is_scoped = decisions.has_scopes() && decision.program.is_composite();
+    assert!(is_scoped || decision.scope == query.window);
+    assert!(decisions != Decisions::Primitives || !decision.program.is_composite());
     let prediction = decision.prediction.as_ref().unwrap();
-    let n_frames = if decision.program.is_composite() { query.window.len() } else { 0 };
+    let n_frames = if is_scoped { query.window.len() } else { 0 };
     assert_eq!([prediction.start_probabilities.len(), prediction.stop_probabilities.len()], [n_frames; 2]);
     assert!((0.0..=1.0).contains(&prediction.end_probability));
 }
 
+struct Lawful;
+
+impl NetworkUse for Lawful {
+    type Output = ();
+
+    fn run<N: Network>(self, network: N) {
+        let queries = queries();
+        let mut policy = LearnedPolicy::new("any", network, Decoder::Mss);
+        for (query, decision) in queries.iter().zip(policy.decide(&queries)) {
+            check_lawful(query, &decision, N::DECISIONS);
+        }
+    }
+}
+
 #[test]
 fn decisions_are_lawful_whatever_the_weights() {
-    let queries = queries();
-    for seed in 0..20 {
-        let mut policy = LearnedPolicy::new("ntp", object_centric(seed), Decoder::Mss);
-        for (query, decision) in queries.iter().zip(policy.decide(&queries)) {
-            check_lawful(query, &decision);
+    for seed in 0..10 {
+        for variant in Variant::ALL {
+            with_network(&config(variant), Seed(seed), &device(), Lawful);
         }
     }
 }
@@ -338,4 +465,25 @@ fn a_decision_does_not_depend_on_its_company() {
     let alone: Vec<Decision> = queries.iter().flat_map(|query| policy.decide(std::slice::from_ref(query))).collect();
     assert_eq!(together, reversed);
     assert_eq!(together, alone);
+}
+
+/// The end probability of the same query: first in a call, after another step of the call, and after a callee ran in
+/// between.
+#[test]
+fn a_recurrent_policy_remembers_a_call_until_it_returns() {
+    let mut policy = LearnedPolicy::new("ntp_gru", recurrent(3), Decoder::Mss);
+    let first = queries().swap_remove(0);
+    let mut ask = |depth: u8, step: u16| {
+        let query = Query { depth, step, ..first.clone() };
+        policy.decide(&[query])[0].prediction.as_ref().unwrap().end_probability
+    };
+    let fresh = ask(0, 0);
+    let callee = ask(1, 0);
+    assert_eq!(callee, fresh, "a callee remembers nothing of its caller");
+    let second = ask(0, 1);
+    assert_ne!(second, fresh, "a call remembers its first step");
+    assert_eq!(ask(0, 0), fresh, "a new call remembers nothing");
+    assert_eq!(ask(1, 0), fresh);
+    assert_eq!(ask(0, 1), second, "what a callee remembers is not its caller's");
+    assert_eq!(ask(1, 1), fresh, "what had returned is forgotten");
 }

@@ -3,7 +3,9 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use ntp::report::{Fact, MetricsInput, ReportInputs, json_schema, make, paper_values};
+use ntp::report::{
+    Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, json_schema, make, paper_values,
+};
 use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
 use serde_json::{Value, json};
 
@@ -18,6 +20,10 @@ struct Rollout {
     cause: Option<&'static str>,
     /// Decision, kind and program.
     divergence: Option<(i64, &'static str, &'static str)>,
+    train_tasks: i64,
+    decoder: &'static str,
+    /// Decision at which physics first went wrong.
+    fault: Option<i64>,
 }
 
 fn write_parquet(path: &Path, mut table: DataFrame) {
@@ -44,6 +50,10 @@ fn rollouts_table(rows: &[Rollout]) -> DataFrame {
         "divergence_kind" => maybe(|row| row.divergence.map(|(_, kind, _)| kind)),
         "divergence_program" => maybe(|row| row.divergence.map(|(.., program)| program)),
         "sim_secs" => rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect::<Vec<_>>(),
+        "train_tasks" => rows.iter().map(|row| Some(row.train_tasks)).collect::<Vec<_>>(),
+        "specification" => maybe(|_| Some("trajectories")),
+        "decoder" => maybe(|row| Some(row.decoder)),
+        "fault_decision" => rows.iter().map(|row| row.fault).collect::<Vec<_>>(),
     )
     .unwrap()
 }
@@ -57,6 +67,9 @@ fn ten_rollouts() -> Vec<Rollout> {
         episode,
         cause,
         divergence,
+        train_tasks: 100,
+        decoder: "mss",
+        fault: None,
     };
     vec![
         row("flat", 0, 0, Some("missed_grasp"), Some((3, "argument", "block_stacking"))),
@@ -94,6 +107,21 @@ fn metrics_table(n_steps: i64) -> DataFrame {
     .unwrap()
 }
 
+fn model() -> ModelSummary {
+    ModelSummary {
+        experiment: "ten".to_owned(),
+        variant: "ntp".to_owned(),
+        train_tasks: 100,
+        seed: 0,
+        parameters: 25_123,
+        cpu_secs: Some(90.0),
+    }
+}
+
+fn input(path: PathBuf) -> RolloutsInput {
+    RolloutsInput { experiment: "ten".to_owned(), path }
+}
+
 /// A run directory with ten rollouts in one file and one training.
 struct Run {
     folder: tempfile::TempDir,
@@ -109,9 +137,20 @@ impl Run {
         write_parquet(&metrics, metrics_table(300));
         let inputs = ReportInputs {
             title: "Ten <rollouts>".to_owned(),
-            rollouts: vec![rollouts],
-            metrics: vec![MetricsInput { variant: "ntp".to_owned(), seed: 0, path: metrics }],
-            facts: vec![Fact { name: "parameters".to_owned(), value: "25 123".to_owned() }],
+            rollouts: vec![input(rollouts)],
+            metrics: vec![MetricsInput { model: model(), path: metrics }],
+            facts: vec![Fact {
+                experiment: "ten".to_owned(),
+                name: "training tasks".to_owned(),
+                value: "100".to_owned(),
+            }],
+            costs: vec![StageCost {
+                experiment: "ten".to_owned(),
+                stage: "train".to_owned(),
+                cpu_secs: 90.0,
+                wall_secs: 50.0,
+            }],
+            commits: vec!["0123456789".to_owned()],
             paper: paper_values(),
         };
         Self { folder, inputs }
@@ -131,7 +170,7 @@ impl Run {
 }
 
 fn rollouts_path(run: &Run) -> &Path {
-    &run.inputs.rollouts[0]
+    &run.inputs.rollouts[0].path
 }
 
 #[test]
@@ -139,10 +178,10 @@ fn ten_rollouts_become_a_results_table() {
     let run = Run::new(&ten_rollouts());
     run.make();
     insta::assert_snapshot!(run.text("results.csv"), @r#"
-    variant,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs
-    ntp,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000
-    ntp,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000
-    flat,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000
+    experiment,variant,train_tasks,specification,decoder,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs
+    ten,ntp,100,trajectories,mss,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000
+    ten,ntp,100,trajectories,mss,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000
+    ten,flat,100,trajectories,mss,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000
     "#);
 }
 
@@ -153,10 +192,10 @@ fn a_training_becomes_curves() {
     let curves = run.text("curves.csv");
     let head: Vec<&str> = curves.lines().take(4).collect();
     insta::assert_snapshot!(head.join("\n"), @"
-    variant,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
-    ntp,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
-    ntp,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
-    ntp,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
+    experiment,variant,train_tasks,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
+    ten,ntp,100,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
+    ten,ntp,100,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
+    ten,ntp,100,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
     ");
     assert_eq!(curves.lines().count(), 1 + 2 * 100, "300 steps are 100 points of 3 steps at each of 2 levels");
 }
@@ -190,6 +229,55 @@ fn seeds_are_averaged_and_the_paper_stands_beside() {
     assert_eq!((ntp.lowest_success_rate, ntp.highest_success_rate), (0.8, 1.0));
     assert_eq!((ntp.wilson_low, ntp.wilson_high), ntp::report::wilson(7, 8));
     assert_eq!((ntp.paper_success_rate, flat.paper_success_rate), (Some(0.863), None));
+}
+
+#[test]
+fn models_that_differ_in_tasks_or_decoder_are_told_apart() {
+    let mut rows = ten_rollouts();
+    for (train_tasks, decoder) in [(20, "mss"), (100, "argmax")] {
+        rows.extend(ten_rollouts().into_iter().map(|row| Rollout { train_tasks, decoder, ..row }));
+    }
+    let report = Run::new(&rows).make();
+    let told = report.aggregates.iter().map(|row| {
+        let actor = &row.actor;
+        (actor.variant.as_str(), actor.train_tasks.unwrap(), actor.decoder.as_deref().unwrap(), row.episodes)
+    });
+    let told: Vec<_> = told.collect();
+    let of = |name, n| [(name, 100, "mss", n), (name, 100, "argmax", n), (name, 20, "mss", n)];
+    assert_eq!(told, [of("ntp", 8), of("flat", 2)].concat());
+}
+
+#[test]
+fn the_first_error_is_a_decision_unless_physics_went_wrong_before() {
+    let mut rows = ten_rollouts();
+    let physics = |fault| Rollout { seed: 2, cause: Some("dropped_object"), fault, ..ten_rollouts()[4].clone() };
+    rows.extend([
+        Rollout { episode: 0, ..physics(Some(16)) },
+        Rollout { episode: 1, ..physics(Some(17)) },
+        Rollout { episode: 2, divergence: None, ..physics(Some(3)) },
+    ]);
+    let report = Run::new(&rows).make();
+    let told: Vec<_> = report
+        .errors
+        .iter()
+        .filter(|error| error.actor.variant == "ntp")
+        .map(|error| (error.program.as_deref(), error.error.as_str(), error.episodes))
+        .collect();
+    assert_eq!(told, [(None, "physics", 2), (Some("pick_and_place"), "scope", 2)]);
+}
+
+#[test]
+fn the_markdown_says_what_made_the_figures() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    insta::assert_snapshot!(run.text("report.md"), @"
+    **Ten <rollouts>**: ntp 0.1.0, commit 0123456789, training seeds 0, 1.5 CPU-minutes.
+
+    | suite           | model | tasks | decoder | seeds | rollouts | success | 95 %           | paper |
+    | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | -------------- | ----: |
+    | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978] | 0.863 |
+    | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658] |     - |
+    ");
 }
 
 #[test]
@@ -246,8 +334,8 @@ fn the_page_shows_every_part() {
         "ended early: 1 of 8 rollouts, 12.5 %",
         "<code>ntp</code> 1 of 1 failures; 1 recovered",
         "decision 17: scope, 1 rollouts",
-        "ntp, training seed 0: 0.1267 in the end",
-        "<dt>parameters</dt><dd>25 123</dd>",
+        "ntp, 100 tasks, training seed 0: 0.1267 in the end",
+        "<dt>training tasks</dt><dd>100</dd>",
         "rollouts.parquet</code>",
     ] {
         assert!(page.contains(part), "the page lacks {part}");
@@ -259,8 +347,8 @@ fn the_same_inputs_in_any_order_give_the_same_bytes() {
     let mut run = Run::new(&ten_rollouts()[..5]);
     let second = run.folder.path().join("rollouts/more/rollouts.parquet");
     write_parquet(&second, rollouts_table(&ten_rollouts()[5..]));
-    run.inputs.rollouts.push(second);
-    let files = || ["report.json", "results.csv", "curves.csv", "index.html"].map(|name| run.text(name));
+    run.inputs.rollouts.push(input(second));
+    let files = || ["report.json", "report.md", "results.csv", "curves.csv", "index.html"].map(|name| run.text(name));
     make(&run.inputs, &run.out()).unwrap();
     let before = files();
     let mut inputs = run.inputs.clone();
@@ -301,6 +389,10 @@ fn write_own_table(path: &Path) {
         ("divergence_kind", maybe(|row| row.divergence.map(|(_, kind, _)| kind))),
         ("divergence_program", maybe(|row| row.divergence.map(|(.., program)| program))),
         ("sim_secs", Column::Float64(rows.iter().map(|row| 10.0 + 0.1 * row.episode as f64).collect())),
+        ("train_tasks", Column::OptionalInt64(rows.iter().map(|row| Some(row.train_tasks)).collect())),
+        ("specification", maybe(|_| Some("trajectories"))),
+        ("decoder", maybe(|row| Some(row.decoder))),
+        ("fault_decision", Column::OptionalInt64(rows.iter().map(|row| row.fault).collect())),
     ];
     write(path, &TableSchema::ROLLOUTS, columns).unwrap();
 }
@@ -382,8 +474,8 @@ fn a_table_that_cannot_be_trusted_is_refused_by_name() {
         "4 rows in which first_divergence has no program, or a kind that is not one of",
     );
     check_error(
-        |run| run.inputs.rollouts.push(rollouts_path(run).to_owned()),
-        "2 episodes of variant flat, suite stacking_unseen, training seed 0 occur more than once",
+        |run| run.inputs.rollouts.push(input(rollouts_path(run).to_owned())),
+        "2 episodes of experiment ten, variant flat trained on 100 tasks, decoder mss, suite stacking_unseen, training seed 0 occur more than once",
     );
     check_error(
         |run| {

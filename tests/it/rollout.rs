@@ -1,5 +1,6 @@
 //! The interpreter, driven by the oracle.
 
+use ntp::model::Decisions;
 use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, run};
 use ntp::scene::SlotIndex;
 use ntp::task::{Split, Task};
@@ -82,7 +83,8 @@ fn a_wrong_argument_is_the_first_divergence_and_fails_the_goal() {
 #[test]
 fn an_early_end_of_the_root_is_a_failure_although_nothing_went_wrong_before() {
     let rollout = check_spoiled(7, |query, decision| *decision = Decision::end(query));
-    assert_eq!(rollout.first_divergence.unwrap().kind.name(), "program");
+    assert_eq!(rollout.first_divergence.unwrap().kind.name(), "early_end");
+    assert_eq!(rollout.fault_decision, None);
     assert_eq!(rollout.episode.outcome, Outcome::Failure(Cause::EndedEarly));
 }
 
@@ -106,4 +108,45 @@ fn a_policy_that_never_ends_is_stopped() {
     let task = tower("t", &[4, 1], Split::Unseen);
     let rollouts = run(&mut Endless, vec![start(&task, 1, 1)], Limits::default()).unwrap();
     assert_eq!(rollouts[0].episode.outcome, Outcome::Failure(Cause::NeverEnded));
+}
+
+/// Repeats the expert's primitives from the root, as a flat model decides.
+struct FlatOracle(Vec<Decision>);
+
+impl Policy for FlatOracle {
+    fn name(&self) -> &str {
+        "flat"
+    }
+
+    fn decides(&self) -> Decisions {
+        Decisions::Primitives
+    }
+
+    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+        let decision = |query: &Query| {
+            let planned = self.0.get(query.decision as usize).cloned();
+            planned.map_or_else(|| Decision::end(query), |decision| Decision { scope: query.window, ..decision })
+        };
+        queries.iter().map(decision).collect()
+    }
+}
+
+#[test]
+fn primitives_called_by_the_root_do_what_the_hierarchy_does() {
+    let task = tower("t", &[4, 1, 6], Split::Unseen);
+    let starts = vec![start(&task, 1, 1)];
+    let calls = starts[0].demonstration.calls.clone();
+    let primitives = calls.iter().filter(|call| call.program.is_primitive());
+    let decision = |call: &ntp::trace::ProgramCall| Decision {
+        program: call.program,
+        scope: call.input,
+        argument: call.argument,
+        end_of_program: false,
+        prediction: None,
+    };
+    let rollout =
+        run(&mut FlatOracle(primitives.map(decision).collect()), starts, Limits::default()).unwrap().remove(0);
+    assert_eq!(rollout.episode.outcome, Outcome::Success);
+    assert_eq!((rollout.decisions, rollout.first_divergence), (2 * 4 + 1, None));
+    assert!(rollout.episode.calls.iter().skip(1).all(|call| call.depth == 1));
 }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use ntp::dataset::{DatasetTrials, TrialData};
-use ntp::model::{CONFIG_FILE, Decoder, ModelConfig, Variant, WEIGHTS_FILE};
+use ntp::model::{CONFIG_FILE, Decisions, Decoder, ModelConfig, Variant, WEIGHTS_FILE};
 use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
@@ -13,7 +13,7 @@ use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, Provenance, Span, instructions};
 use ntp::training::{
-    Curriculum, Example, Examples, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
+    Curriculum, Example, Examples, Grain, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
     Training, draw, train,
 };
 
@@ -88,6 +88,66 @@ fn labels_of_stacking_are_the_demonstrations_spans() {
 }
 
 #[test]
+fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
+    let data = towers();
+    let examples = Examples::of(&data, Decisions::Primitives, Grain::Call).unwrap();
+    assert_eq!(examples.levels().collect::<Vec<_>>(), [(Program::BlockStacking, true)]);
+    let mut rng = Seed(1).rng();
+    let mut run = examples.draw(0, Pairing::Cross, &mut rng);
+    while data.trials[run[0].trial].task_id != "b" {
+        run = examples.draw(0, Pairing::Cross, &mut rng);
+    }
+    let seen: Vec<_> = run.iter().map(|step| (step.callee, step.argument, step.frame, step.end_of_program)).collect();
+    let slot = |slot| Some(SlotIndex(slot));
+    assert_eq!(
+        seen,
+        [
+            (Program::MoveTo, slot(3), 0, false),
+            (Program::Grip, None, 1, false),
+            (Program::MoveTo, slot(5), 2, false),
+            (Program::Release, None, 3, false),
+            (Program::None, None, 4, true),
+        ]
+    );
+    assert!(run.iter().all(|step| step.window == span(0, 5) && step.scope.is_none()));
+}
+
+#[test]
+fn without_scopes_every_program_learns_from_the_whole_demonstration() {
+    let data = towers();
+    let examples = Examples::of(&data, Decisions::Unscoped, Grain::Decision).unwrap();
+    assert_eq!(examples.levels().count(), 4);
+    let mut rng = Seed(1).rng();
+    for level in 0..4 {
+        for example in (0..20).flat_map(|_| examples.draw(level, Pairing::Cross, &mut rng)) {
+            let n_frames = data.trials[example.demonstration].n_frames as u32;
+            assert_eq!((example.window, example.scope), (span(0, n_frames), None));
+        }
+    }
+}
+
+#[test]
+fn the_steps_of_a_call_are_packed_step_by_step() {
+    let data = towers();
+    let examples = Examples::of(&data, Decisions::Scoped, Grain::Call).unwrap();
+    let config = resolved(TrainConfig { relabel_slots: Some(1.0), ..TrainConfig::default() });
+    for level in 0..4 {
+        for part in draw(&examples, &config, level, 24, Seed(2)) {
+            assert_eq!(part.steps.iter().sum::<usize>(), part.ends.len());
+            assert!(part.steps.is_sorted_by(|a, b| a >= b), "{:?}", part.steps);
+            // The last of a call's steps ends its program, and no other does.
+            let mut begin = 0;
+            for (step, &n_calls) in part.steps.iter().enumerate() {
+                let after = part.steps.get(step + 1).copied().unwrap_or(0);
+                let expected: Vec<f32> = (0..n_calls).map(|call| f32::from(u8::from(call >= after))).collect();
+                assert_eq!(part.ends[begin..begin + n_calls], expected);
+                begin += n_calls;
+            }
+        }
+    }
+}
+
+#[test]
 fn sub_tasks_are_matched_by_what_they_do_when_counts_differ() {
     let task = sorting("m", [0, 2, 2, 1], Split::Seen);
     let episodes = [1, 2].map(|count| trial_data(&demonstration(&task, &trial(&task, count.into(), count), 0)));
@@ -111,10 +171,10 @@ fn cross_pairing_takes_another_trial_and_own_pairing_the_same() {
     let mut rng = Seed(1).rng();
     for level in 0..examples.levels().count() {
         for _ in 0..50 {
-            let cross = examples.draw(level, Pairing::Cross, &mut rng);
+            let cross = examples.draw(level, Pairing::Cross, &mut rng).remove(0);
             assert_ne!(cross.demonstration, cross.trial);
             assert_eq!(data.trials[cross.demonstration].task_id, data.trials[cross.trial].task_id);
-            let own = examples.draw(level, Pairing::Own, &mut rng);
+            let own = examples.draw(level, Pairing::Own, &mut rng).remove(0);
             assert_eq!(own.demonstration, own.trial);
         }
     }
@@ -126,8 +186,8 @@ fn unseen_tasks_are_never_learned_from() {
     data.trials.extend(demonstrations(&[tower("c", &[6, 7], Split::Unseen)], 2).trials);
     let examples = Examples::new(&data).unwrap();
     let mut rng = Seed(1).rng();
-    let drawn = (0..100).map(|_| examples.draw(0, Pairing::Cross, &mut rng));
-    assert!(drawn.into_iter().all(|example| data.trials[example.trial].split == Split::Seen));
+    let drawn = (0..100).flat_map(|_| examples.draw(0, Pairing::Cross, &mut rng));
+    assert!(drawn.collect::<Vec<_>>().into_iter().all(|example| data.trials[example.trial].split == Split::Seen));
 }
 
 #[test]

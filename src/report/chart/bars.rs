@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Key, N_COLORS, Tick};
-use crate::report::page::title_of;
+use crate::report::page::{name_of, title_of};
 use crate::report::summary::Aggregate;
 use crate::trace::Cause;
 
@@ -30,7 +30,7 @@ pub(in crate::report) struct BarSuite {
 /// One variant in one suite.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct BarRow {
-    pub(in crate::report) variant: String,
+    pub(in crate::report) name: String,
     /// Failed rollouts in percent of all.
     pub(in crate::report) failed: String,
     pub(in crate::report) parts: Vec<BarPart>,
@@ -52,7 +52,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
     let end = ENDS.into_iter().find(|&end| end >= highest).unwrap_or(1.0);
     let causes = causes(aggregates);
     let row = |row: &Aggregate| BarRow {
-        variant: row.variant.clone(),
+        name: name_of(&row.actor),
         failed: percent(share(row)),
         parts: parts(row, &causes, end),
     };

@@ -42,11 +42,11 @@ struct Axes {
 }
 
 /// A grid for each part of the loss that was recorded, the total first.
-pub(in crate::report) fn grids(curves: &[Curve], variants: &[String]) -> Vec<CurveGrid> {
+pub(in crate::report) fn grids(curves: &[Curve]) -> Vec<CurveGrid> {
     let grids = (0..PARTS.len()).filter_map(|part| {
         let axes = axes(curves, part)?;
         let levels = distinct(curves.iter().map(|curve| &curve.level));
-        let panels = levels.iter().map(|level| panel(curves, part, level, variants, &axes));
+        let panels = levels.iter().map(|level| panel(curves, part, level, &axes));
         let panels = panels.filter(|panel| !panel.lines.is_empty()).collect();
         Some(CurveGrid { part: PARTS[part].trim_start_matches("loss_").to_owned(), panels })
     });
@@ -63,12 +63,16 @@ fn axes(curves: &[Curve], part: usize) -> Option<Axes> {
     Some(Axes { last_step, low, high: high.max(low + 1) })
 }
 
-fn panel(curves: &[Curve], part: usize, level: &str, variants: &[String], axes: &Axes) -> CurvePanel {
+fn panel(curves: &[Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel {
     let line = |curve: &Curve| {
+        let model = &curve.model;
         let path = path(&curve.points, part, axes);
         let last = curve.points.iter().rev().find_map(|point| point.losses[part])?;
-        let tip = format!("{}, training seed {}: {last:.4} in the end", curve.variant, curve.seed);
-        Some(Line { color: color_of(variants, &curve.variant), path, tip })
+        let tip = format!(
+            "{}, {} tasks, training seed {}: {last:.4} in the end",
+            model.variant, model.train_tasks, model.seed
+        );
+        Some(Line { color: color_of(&model.variant), path, tip })
     };
     let step = nice_step(axes.last_step, 4.0);
     let x_tick = |mark: usize| {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Tick, color_of};
-use crate::report::page::title_of;
+use crate::report::page::{name_of, title_of};
 use crate::report::summary::{Aggregate, SuiteResult};
 
 /// Where the axis may begin, and the distance of its marks then.
@@ -32,7 +32,7 @@ pub(in crate::report) struct DotSuite {
 /// One variant in one suite; places in percent of the width.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct DotRow {
-    pub(in crate::report) variant: String,
+    pub(in crate::report) name: String,
     pub(in crate::report) color: usize,
     pub(in crate::report) mean_at: String,
     pub(in crate::report) low_at: String,
@@ -48,11 +48,7 @@ pub(in crate::report) struct DotRow {
 }
 
 /// Nothing without results.
-pub(in crate::report) fn plot(
-    aggregates: &[Aggregate],
-    results: &[SuiteResult],
-    variants: &[String],
-) -> Option<DotPlot> {
+pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult]) -> Option<DotPlot> {
     let lowest = |row: &Aggregate| {
         let paper = row.paper_success_rate.unwrap_or(1.0);
         row.wilson_low.min(row.lowest_success_rate).min(paper)
@@ -61,11 +57,11 @@ pub(in crate::report) fn plot(
     let (start, step) = STARTS.into_iter().find(|(start, _)| *start <= lowest).unwrap_or((0.0, 0.25));
     let at = |value: f64| place(value, start, 1.0);
     let row = |row: &Aggregate| {
-        let is_same = |seed: &&SuiteResult| seed.variant == row.variant && seed.suite == row.suite;
+        let is_same = |seed: &&SuiteResult| seed.actor == row.actor && seed.suite == row.suite;
         let seeds = results.iter().filter(is_same).map(|seed| at(seed.success_rate));
         DotRow {
-            variant: row.variant.clone(),
-            color: color_of(variants, &row.variant),
+            name: name_of(&row.actor),
+            color: color_of(&row.actor.variant),
             mean_at: at(row.mean_success_rate),
             low_at: at(row.wilson_low),
             high_at: at(row.wilson_high),

@@ -8,7 +8,8 @@ use crate::report::order;
 use crate::report::summary::{Aggregate, Divergence};
 
 /// What can differ, and its colour.
-pub(in crate::report) const KINDS: [(&str, usize); 4] = [("program", 6), ("argument", 5), ("scope", 0), ("end", 3)];
+pub(in crate::report) const KINDS: [(&str, usize); 5] =
+    [("program", 6), ("argument", 5), ("scope", 0), ("early_end", 3), ("late_end", 1)];
 /// Most bars of a panel.
 const MAX_BINS: i64 = 24;
 /// Fewer bars would be slabs.
@@ -70,7 +71,7 @@ pub(in crate::report) fn plot(divergences: &[Divergence], aggregates: &[Aggregat
     variants.sort_by_cached_key(|variant| order::variant(variant));
     let panels: Vec<Histogram> =
         variants.iter().filter_map(|variant| panel(divergences, aggregates, variant)).collect();
-    let key = |(kind, color): (&str, usize)| Key { label: kind.to_owned(), color };
+    let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color };
     (!panels.is_empty()).then(|| Histograms { keys: KINDS.into_iter().map(key).collect(), panels })
 }
 
@@ -78,7 +79,7 @@ fn panel(divergences: &[Divergence], aggregates: &[Aggregate], variant: &str) ->
     let own = || divergences.iter().filter(|divergence| divergence.variant == variant);
     let failures: Vec<&Divergence> = own().filter(|divergence| divergence.ended == "failure").collect();
     let bins = Bins::new(&failures)?;
-    let failed = aggregates.iter().filter(|row| row.variant == variant).map(|row| row.episodes - row.successes);
+    let failed = aggregates.iter().filter(|row| row.actor.variant == variant).map(|row| row.episodes - row.successes);
     Some(Histogram {
         title: variant.to_owned(),
         failed: failed.sum(),

@@ -31,7 +31,7 @@ pub(in crate::report) fn thousands(number: u64) -> String {
 }
 
 /// A number without trailing zeros.
-pub(super) fn short(number: f64) -> String {
+pub(in crate::report) fn short(number: f64) -> String {
     let text = format!("{number:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

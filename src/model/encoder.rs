@@ -1,0 +1,85 @@
+//! What an encoder is to the rest of a network.
+//!
+//! An encoder reads the task specification and the state. The core, the scoping head and the program memory only see
+//! what it makes of them, so another kind of specification or of observation is another encoder.
+
+use burn::module::{Module, ModuleDisplay};
+use burn::tensor::{Device, Tensor};
+
+use crate::model::layers::Init;
+use crate::model::windows::Windows;
+use crate::trace::Span;
+
+/// Features that an encoder gives, and the layers that suit it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Widths {
+    /// Of the specification as a whole.
+    pub context: usize,
+    /// Of the state.
+    pub state: usize,
+    /// Of each frame of the specification.
+    pub frame: usize,
+    /// Of program embeddings and keys.
+    pub program: usize,
+    /// Of the core's layers; the last is what it decides from.
+    pub core: Vec<usize>,
+}
+
+impl Widths {
+    /// What the core decides from.
+    pub fn hidden(&self) -> usize {
+        self.core.last().copied().unwrap_or_default()
+    }
+}
+
+/// Reads the task specification and the state (the paper's `f_TSE` and `f_ENC`).
+pub trait Encoder: Module + ModuleDisplay + Sync + Sized + 'static {
+    /// Its widths, as they stand in a model's configuration.
+    type Config: Copy;
+    /// What is computed of a specification before any state is seen.
+    type Demonstration: Clone + Send + Sync;
+    /// Specification and state, encoded.
+    type Reading;
+    /// How it finds the argument of a primitive.
+    type Argument: ArgumentDecoder<Self>;
+
+    /// A fresh encoder for scenes of `n_slots` slots.
+    fn new(config: &Self::Config, n_slots: usize, init: &mut Init) -> Self;
+
+    /// What it gives.
+    fn widths(config: &Self::Config) -> Widths;
+
+    /// See [`super::Network::demonstration`].
+    fn demonstration(&self, windows: &Windows) -> Self::Demonstration;
+
+    /// See [`super::Network::window`].
+    fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
+
+    /// See [`super::Network::read`].
+    fn read(&self, demonstration: &Self::Demonstration, states: &[f32]) -> Self::Reading;
+
+    /// The specification as a whole, `[B, context]`.
+    fn context(reading: &Self::Reading) -> Tensor<2>;
+
+    /// The state, `[B, state]`.
+    fn state(reading: &Self::Reading) -> Tensor<2>;
+
+    /// Each frame of the specification as the scoping head sees it, `[B, T, frame]`.
+    fn frames(reading: &Self::Reading) -> Tensor<3>;
+
+    /// Where the parameters are.
+    fn device(&self) -> Device;
+}
+
+/// Finds the argument of a primitive.
+pub trait ArgumentDecoder<E: Encoder>: Module + ModuleDisplay + Sync + 'static {
+    /// A fresh decoder. `n_view` is the width of what stands for the state, see [`super::Core::view_width`].
+    fn new(config: &E::Config, n_slots: usize, n_view: usize, init: &mut Init) -> Self;
+
+    /// Logits over the slots.
+    ///
+    /// # Shapes
+    ///
+    /// program `[B, program]`, view `[B, view]`, hidden `[B, hidden]` → `[B, N]`
+    fn forward(&self, reading: &E::Reading, program: Tensor<2>, view: Tensor<2>, hidden: Tensor<2>) -> Tensor<2>;
+}

@@ -1,0 +1,117 @@
+//! The kinds of network by name.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// A kind of network. A plain name has the object-centric encoder; `_paper` behind it means the paper's flattened one.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Variant {
+    /// NTP: reactive, scoped.
+    #[default]
+    Ntp,
+    /// NTP with the paper's encoder.
+    NtpPaper,
+    /// NTP with a GRU core, whose state belongs to a program call.
+    NtpGru,
+    /// The same with the paper's encoder.
+    NtpGruPaper,
+    /// NTP without scopes: every program sees the whole demonstration.
+    NtpNoScope,
+    /// The same with the paper's encoder.
+    NtpNoScopePaper,
+    /// No hierarchy: primitives directly from demonstration and observation.
+    Flat,
+    /// The same with the paper's encoder.
+    FlatPaper,
+    /// No hierarchy, with a GRU core.
+    FlatGru,
+    /// The same with the paper's encoder.
+    FlatGruPaper,
+}
+
+/// The parts of a network, but for its encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Architecture {
+    /// [`super::Ntp`]
+    Ntp,
+    /// [`super::NtpGru`]
+    NtpGru,
+    /// [`super::NtpNoScope`]
+    NtpNoScope,
+    /// [`super::Flat`]
+    Flat,
+    /// [`super::FlatGru`]
+    FlatGru,
+}
+
+/// How observations and demonstrations are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderKind {
+    /// Slot by slot.
+    ObjectCentric,
+    /// As one vector: the paper's.
+    Flattened,
+}
+
+impl Variant {
+    /// Every variant.
+    pub const ALL: [Self; 10] = [
+        Self::Ntp,
+        Self::NtpPaper,
+        Self::NtpGru,
+        Self::NtpGruPaper,
+        Self::NtpNoScope,
+        Self::NtpNoScopePaper,
+        Self::Flat,
+        Self::FlatPaper,
+        Self::FlatGru,
+        Self::FlatGruPaper,
+    ];
+
+    /// The name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ntp => "ntp",
+            Self::NtpPaper => "ntp_paper",
+            Self::NtpGru => "ntp_gru",
+            Self::NtpGruPaper => "ntp_gru_paper",
+            Self::NtpNoScope => "ntp_no_scope",
+            Self::NtpNoScopePaper => "ntp_no_scope_paper",
+            Self::Flat => "flat",
+            Self::FlatPaper => "flat_paper",
+            Self::FlatGru => "flat_gru",
+            Self::FlatGruPaper => "flat_gru_paper",
+        }
+    }
+
+    /// What its parts are, but for the encoder.
+    pub fn architecture(self) -> Architecture {
+        match self {
+            Self::Ntp | Self::NtpPaper => Architecture::Ntp,
+            Self::NtpGru | Self::NtpGruPaper => Architecture::NtpGru,
+            Self::NtpNoScope | Self::NtpNoScopePaper => Architecture::NtpNoScope,
+            Self::Flat | Self::FlatPaper => Architecture::Flat,
+            Self::FlatGru | Self::FlatGruPaper => Architecture::FlatGru,
+        }
+    }
+
+    /// Its encoder.
+    pub fn encoder(self) -> EncoderKind {
+        match self {
+            Self::Ntp | Self::NtpGru | Self::NtpNoScope | Self::Flat | Self::FlatGru => EncoderKind::ObjectCentric,
+            Self::NtpPaper | Self::NtpGruPaper | Self::NtpNoScopePaper | Self::FlatPaper | Self::FlatGruPaper => {
+                EncoderKind::Flattened
+            }
+        }
+    }
+}
+
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

@@ -1,0 +1,95 @@
+//! `report.md`: the results as a table for a README or a terminal, and what made them.
+
+use crate::report::chart::distinct;
+use crate::report::chart::scale::short;
+use crate::report::summary::{Aggregate, Report};
+
+/// The columns, and whether numbers stand in them.
+const COLUMNS: [(&str, bool); 9] = [
+    ("suite", false),
+    ("model", false),
+    ("tasks", true),
+    ("decoder", false),
+    ("seeds", true),
+    ("rollouts", true),
+    ("success", true),
+    ("95 %", false),
+    ("paper", true),
+];
+
+/// The whole text.
+pub(super) fn render(report: &Report) -> String {
+    let mut text = format!("{}\n", made_by(report));
+    if !report.aggregates.is_empty() {
+        text.push('\n');
+        text.push_str(&table(&COLUMNS, report.aggregates.iter().map(row).collect()));
+    }
+    text
+}
+
+/// What made the figures: program, commit, seeds, cost.
+fn made_by(report: &Report) -> String {
+    let mut parts = vec![format!("**{}**: ntp {}", report.title, report.ntp_version)];
+    if !report.commits.is_empty() {
+        parts.push(format!("commit {}", report.commits.join(", ")));
+    }
+    let mut seeds: Vec<i64> = report.models.iter().map(|model| model.seed).collect();
+    seeds.sort_unstable();
+    seeds.dedup();
+    if !seeds.is_empty() {
+        let seeds = seeds.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
+        parts.push(format!("training seeds {seeds}"));
+    }
+    let cpu_secs: f64 = report.costs.iter().map(|cost| cost.cpu_secs).sum();
+    if cpu_secs > 0.0 {
+        parts.push(format!("{} CPU-minutes", short((cpu_secs / 6.0).round() / 10.0)));
+    }
+    let experiments = distinct(report.aggregates.iter().map(|row| &row.actor.experiment));
+    if experiments.len() > 1 {
+        parts.push(format!("experiments {}", experiments.join(", ")));
+    }
+    format!("{}.", parts.join(", "))
+}
+
+fn row(row: &Aggregate) -> Vec<String> {
+    let none = || "-".to_owned();
+    vec![
+        row.suite.clone(),
+        row.actor.variant.clone(),
+        row.actor.train_tasks.map_or_else(none, |tasks| tasks.to_string()),
+        row.actor.decoder.clone().unwrap_or_else(none),
+        row.seeds.to_string(),
+        row.episodes.to_string(),
+        format!("{:.3}", row.mean_success_rate),
+        format!("[{:.3}, {:.3}]", row.wilson_low, row.wilson_high),
+        row.paper_success_rate.map_or_else(none, |rate| format!("{rate:.3}")),
+    ]
+}
+
+/// A table whose columns stand one below the other in plain text too.
+fn table(columns: &[(&str, bool)], rows: Vec<Vec<String>>) -> String {
+    let width = |at: usize| {
+        let cells = rows.iter().map(|row| row[at].chars().count());
+        cells.chain([columns[at].0.chars().count(), 3]).max().unwrap_or(3)
+    };
+    let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+    let pad = |(at, cell): (usize, &str)| match columns[at].1 {
+        true => format!("{cell:>width$}", width = widths[at]),
+        false => format!("{cell:<width$}", width = widths[at]),
+    };
+    let line = |cells: &[&str]| {
+        let cells: Vec<String> = cells.iter().copied().enumerate().map(pad).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let rule = |at: usize| match columns[at].1 {
+        true => format!("{}:", "-".repeat(widths[at] - 1)),
+        false => "-".repeat(widths[at]),
+    };
+    let rules: Vec<String> = (0..columns.len()).map(rule).collect();
+    let mut text = line(&columns.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    text.push_str(&line(&rules.iter().map(String::as_str).collect::<Vec<_>>()));
+    for row in &rows {
+        text.push_str(&line(&row.iter().map(String::as_str).collect::<Vec<_>>()));
+    }
+    text
+}
