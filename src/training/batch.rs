@@ -42,18 +42,10 @@ pub struct Part {
     pub arguments: Option<Vec<f32>>,
 }
 
-/// One example with its own copies of what augmentations change.
-struct Prepared {
-    example: Example,
-    window: Vec<f32>,
-    state: Vec<f32>,
-    argument: Option<usize>,
-}
-
 /// Draws a mini-batch of a level. It depends on nothing but its arguments.
 pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, size: usize, seed: Seed) -> Vec<Part> {
     let mut rng = seed.rng();
-    let mut drawn: Vec<Prepared> = (0..size)
+    let mut drawn: Vec<Views> = (0..size)
         .map(|_| {
             let example = examples.draw(level_idx, config.pairing, &mut rng);
             prepare(examples, config, example, &mut rng)
@@ -69,7 +61,7 @@ pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, siz
 }
 
 /// Where to split windows that are sorted by length so that both parts have about as many frames.
-fn balanced(drawn: &[Prepared], n_frames: usize) -> usize {
+fn balanced(drawn: &[Views], n_frames: usize) -> usize {
     let mut before = 0;
     let lengths = drawn.iter().map(|prepared| prepared.example.window.len());
     let short = lengths.take_while(|length| {
@@ -88,17 +80,17 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(drawn: &[Prepared]) -> Self {
+    fn of(drawn: &[Views]) -> Self {
         let scoped = drawn.iter().filter(|prepared| prepared.example.scope.is_some());
         Self {
             examples: drawn.len(),
             scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
-            arguments: drawn.iter().filter(|prepared| prepared.argument.is_some()).count(),
+            arguments: drawn.iter().filter(|prepared| prepared.example.argument.is_some()).count(),
         }
     }
 }
 
-fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Prepared {
+fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Views {
     let data = examples.data();
     let width = Observation::width(data.n_slots);
     let rows = &data.trials[example.demonstration].observations;
@@ -106,14 +98,13 @@ fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng:
         n_slots: data.n_slots,
         window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
-        argument: example.argument.map(|slot| usize::from(slot.0)),
+        example,
     };
-    views.augment(data.trials[example.trial].family, config, &example, rng);
-    let Views { n_slots: _, window, state, argument } = views;
-    Prepared { example, window, state, argument }
+    views.augment(data.trials[views.example.trial].family, config, rng);
+    views
 }
 
-fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts: Counts) -> Part {
+fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Views], counts: Counts) -> Part {
     let n_slots = examples.data().n_slots;
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
     let windows = Windows::new(n_slots, &slices);
@@ -125,9 +116,11 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts
         .iter()
         .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
         .collect();
-    let arguments = part.iter().any(|prepared| prepared.argument.is_some()).then(|| {
+    let arguments = part.iter().any(|prepared| prepared.example.argument.is_some()).then(|| {
         let value = 1.0 / counts.arguments as f32;
-        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.argument, value)).collect()
+        part.iter()
+            .flat_map(|prepared| one_hot(n_slots, prepared.example.argument.map(|slot| usize::from(slot.0)), value))
+            .collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
@@ -145,7 +138,7 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, part: &[Prepared], counts
 }
 
 /// `[B, T, 4]`, zero where a frame has no label.
-fn scope_targets(part: &[Prepared], n_frames: usize, value: f32) -> Vec<f32> {
+fn scope_targets(part: &[Views], n_frames: usize, value: f32) -> Vec<f32> {
     let n_labels = ScopingLabel::ALL.len();
     let mut targets = vec![0.0; part.len() * n_frames * n_labels];
     for (prepared, frames) in part.iter().zip(targets.chunks_exact_mut((n_frames * n_labels).max(1))) {
