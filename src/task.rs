@@ -16,7 +16,7 @@ mod set;
 pub use file::TaskFileError;
 pub use goal::{Condition, Goal, condition_holds, goal_holds};
 pub use import::{ImportError, ImportProblem, import};
-pub use layout::{MAX_INSTANCES, Trial, initial_state, scene};
+pub use layout::{CONTAINER_HALF_M, MAX_INSTANCES, Trial, initial_state, scene};
 pub use sampler::{SampleError, sample};
 pub use set::{TaskSet, TaskSetError};
 

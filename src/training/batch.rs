@@ -44,17 +44,9 @@ pub struct Part {
     pub arguments: Option<Vec<f32>>,
 }
 
-/// One example with its own copies of what augmentations change.
-struct Prepared {
-    example: Example,
-    window: Vec<f32>,
-    state: Vec<f32>,
-    argument: Option<usize>,
-}
-
 /// Decisions of one call that are learned together, all with the same window.
 struct Run {
-    decisions: Vec<Prepared>,
+    decisions: Vec<Views>,
 }
 
 impl Run {
@@ -100,12 +92,12 @@ fn balanced(runs: &[Run], n_frames: usize) -> usize {
 
 /// Step by step: the first decision of every run, then the second of those that have one, and so on, with the longest
 /// runs first; and how many there are of each.
-fn packed(mut runs: Vec<Run>) -> (Vec<Prepared>, Vec<usize>) {
+fn packed(mut runs: Vec<Run>) -> (Vec<Views>, Vec<usize>) {
     runs.sort_by_key(|run| std::cmp::Reverse(run.decisions.len()));
     let mut rest: Vec<_> = runs.into_iter().map(|run| run.decisions.into_iter()).collect();
     let (mut decisions, mut steps) = (Vec::new(), Vec::new());
     loop {
-        let step: Vec<Prepared> = rest.iter_mut().filter_map(Iterator::next).collect();
+        let step: Vec<Views> = rest.iter_mut().filter_map(Iterator::next).collect();
         if step.is_empty() {
             return (decisions, steps);
         }
@@ -123,12 +115,12 @@ struct Counts {
 }
 
 impl Counts {
-    fn of<'d>(drawn: impl Iterator<Item = &'d Prepared> + Clone) -> Self {
+    fn of<'d>(drawn: impl Iterator<Item = &'d Views> + Clone) -> Self {
         let scoped = drawn.clone().filter(|prepared| prepared.example.scope.is_some());
         Self {
             examples: drawn.clone().count(),
             scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
-            arguments: drawn.filter(|prepared| prepared.argument.is_some()).count(),
+            arguments: drawn.filter(|prepared| prepared.example.argument.is_some()).count(),
         }
     }
 }
@@ -143,7 +135,7 @@ fn prepare_run(examples: &Examples<'_>, config: &TrainConfig, run: Vec<Example>,
     Run { decisions: run.into_iter().map(prepare).collect() }
 }
 
-fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Prepared {
+fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Views {
     let data = examples.data();
     let width = Observation::width(data.n_slots);
     let rows = &data.trials[example.demonstration].observations;
@@ -151,11 +143,10 @@ fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng:
         n_slots: data.n_slots,
         window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
-        argument: example.argument.map(|slot| usize::from(slot.0)),
+        example,
     };
-    views.augment(data.trials[example.trial].family, config, &example, rng);
-    let Views { n_slots: _, window, state, argument } = views;
-    Prepared { example, window, state, argument }
+    views.augment(data.trials[views.example.trial].family, config, rng);
+    views
 }
 
 fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
@@ -171,9 +162,9 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         .iter()
         .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
         .collect();
-    let arguments = part.iter().any(|prepared| prepared.argument.is_some()).then(|| {
+    let arguments = part.iter().any(|prepared| prepared.example.argument.is_some()).then(|| {
         let value = 1.0 / counts.arguments as f32;
-        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.argument, value)).collect()
+        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.example.argument.map(|slot| usize::from(slot.0)), value)).collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
@@ -192,7 +183,7 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
 }
 
 /// `[B, T, 4]`, zero where a frame has no label.
-fn scope_targets(part: &[Prepared], n_frames: usize, value: f32) -> Vec<f32> {
+fn scope_targets(part: &[Views], n_frames: usize, value: f32) -> Vec<f32> {
     let n_labels = ScopingLabel::ALL.len();
     let mut targets = vec![0.0; part.len() * n_frames * n_labels];
     for (prepared, frames) in part.iter().zip(targets.chunks_exact_mut((n_frames * n_labels).max(1))) {

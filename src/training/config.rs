@@ -68,6 +68,9 @@ pub struct TrainConfig {
     /// How often slots that the running program has nothing to do with are put elsewhere, in the demonstration and
     /// now (0 to 1): a program learns to look at its own slots alone. Off by default; Object Sorting needs it.
     pub scatter_bystanders: f32,
+    /// How often whatever goes into one container goes into another (0 to 1), so that several categories share one as
+    /// in mappings that no training task shows. Off by default; for Object Sorting.
+    pub merge_containers: f32,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -89,6 +92,7 @@ impl Default for TrainConfig {
             relabel_slots: None,
             gripper_jitter: None,
             scatter_bystanders: 0.0,
+            merge_containers: 0.0,
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -157,6 +161,7 @@ impl TrainConfig {
             ("relabel_slots", self.relabel_slots.unwrap_or(0.0)),
             ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
             ("scatter_bystanders", self.scatter_bystanders),
+            ("merge_containers", self.merge_containers),
         ];
         let weights = [
             ("loss.program", loss.program),
