@@ -15,6 +15,7 @@ mod outcome;
 mod recorder;
 mod rules;
 mod span;
+mod specification;
 
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
@@ -26,3 +27,4 @@ pub use outcome::{Cause, Outcome};
 pub use recorder::{CallRecorder, NewCall};
 pub use rules::{CallProblem, TraceError, check_calls};
 pub use span::{ScopingLabel, Span};
+pub use specification::SpecificationForm;

@@ -5,6 +5,7 @@ use burn::tensor::Device;
 use crate::model::config::{ModelConfig, NetworkConfig};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::Flattened;
+use crate::model::instructed::Instructed;
 use crate::model::network::Network;
 use crate::model::object_centric::ObjectCentric;
 use crate::model::programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope};
@@ -25,6 +26,7 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
     match &config.network {
         NetworkConfig::ObjectCentric(widths) => of_encoder::<ObjectCentric, U>(config, widths, seed, device, wanted),
         NetworkConfig::Flattened(widths) => of_encoder::<Flattened, U>(config, widths, seed, device, wanted),
+        NetworkConfig::Instructed(widths) => wanted.run(Ntp::<Instructed>::new(widths, config.n_slots, seed, device)),
     }
 }
 

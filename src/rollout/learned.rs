@@ -23,7 +23,7 @@ use crate::model::{
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, Query, Specification};
 use crate::scene::SlotIndex;
-use crate::trace::{Prediction, ScopingLabel, Span};
+use crate::trace::{Prediction, ScopingLabel, Span, SpecificationForm};
 
 /// A program ends when its end is at least this likely (the paper's alpha).
 const END_THRESHOLD: f32 = 0.5;
@@ -35,13 +35,18 @@ const END_THRESHOLD: f32 = 0.5;
 /// As [`model::load`].
 pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
     let config = model::load_config(folder)?;
-    let policy = model::load(folder, &config, Deciding { name: config.variant.name(), decoder })?;
+    let policy = model::load(
+        folder,
+        &config,
+        Deciding { name: config.variant.name(), reads: config.network.specification(), decoder },
+    )?;
     Ok((config, policy))
 }
 
 /// Makes a policy of a network.
 struct Deciding {
     name: &'static str,
+    reads: SpecificationForm,
     decoder: Decoder,
 }
 
@@ -49,13 +54,14 @@ impl NetworkUse for Deciding {
     type Output = Box<dyn Policy + Send>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        Box::new(LearnedPolicy::new(self.name, network, self.decoder))
+        Box::new(LearnedPolicy::new(self.name, network, self.decoder).reading(self.reads))
     }
 }
 
 /// A network that decides.
 pub struct LearnedPolicy<N: Network> {
     name: String,
+    reads: SpecificationForm,
     network: N,
     decoder: Decoder,
     /// By address, which the `Arc` in the value keeps from being given to another specification.
@@ -71,10 +77,23 @@ struct Known<D> {
 }
 
 impl<N: Network> LearnedPolicy<N> {
-    /// A policy of the given name. The network is used without gradients.
+    /// A policy of the given name that reads trajectories. The network is used without gradients.
     pub fn new(name: &str, network: N, decoder: Decoder) -> Self {
         let (demonstrations, stacks) = (HashMap::new(), HashMap::new());
-        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations, stacks }
+        Self {
+            name: name.to_owned(),
+            reads: SpecificationForm::default(),
+            network: network.valid(),
+            decoder,
+            demonstrations,
+            stacks,
+        }
+    }
+
+    /// The same, reading task specifications of a form.
+    #[must_use]
+    pub fn reading(self, reads: SpecificationForm) -> Self {
+        Self { reads, ..self }
     }
 
     /// Reads the demonstrations of new episodes, and forgets those of episodes that are over.
@@ -92,8 +111,7 @@ impl<N: Network> LearnedPolicy<N> {
             .into_par_iter()
             .map(|specification| Known {
                 specification: Arc::clone(specification),
-                demonstration: network
-                    .demonstration(&Windows::new(specification.n_slots, &[specification.observations.as_slice()])),
+                demonstration: network.demonstration(&windows(specification)),
             })
             .collect();
         self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
@@ -155,6 +173,10 @@ impl<N: Network> Policy for LearnedPolicy<N> {
         N::DECISIONS
     }
 
+    fn reads(&self) -> SpecificationForm {
+        self.reads
+    }
+
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
         self.refresh(queries);
         let recalled: Vec<_> = queries.iter().map(|query| self.recall(query)).collect();
@@ -165,6 +187,14 @@ impl<N: Network> Policy for LearnedPolicy<N> {
             decision
         };
         queries.iter().zip(decided).map(remember).collect()
+    }
+}
+
+fn windows(specification: &Specification) -> Windows {
+    let rows = [specification.rows.as_slice()];
+    match specification.form {
+        SpecificationForm::Trajectories => Windows::new(specification.n_slots, &rows),
+        SpecificationForm::Instructions => Windows::of_instructions(specification.n_slots, &rows),
     }
 }
 

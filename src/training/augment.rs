@@ -12,7 +12,7 @@ use rand::seq::SliceRandom as _;
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
 use crate::task::Family;
-use crate::trace::Observation;
+use crate::trace::{Observation, SpecificationForm};
 use crate::training::augment::containers::Merge;
 use crate::training::config::TrainConfig;
 use crate::training::examples::Example;
@@ -25,7 +25,8 @@ const SCATTER_M: [f32; 3] = [0.08, 0.08, 0.04];
 /// An example's own copies of what augmentations change.
 pub(super) struct Views {
     pub(super) n_slots: usize,
-    /// Rows of the demonstration's window.
+    pub(super) specification: SpecificationForm,
+    /// Rows of the window of the task specification.
     pub(super) window: Vec<f32>,
     /// The row that is seen now.
     pub(super) state: Vec<f32>,
@@ -68,7 +69,8 @@ impl Views {
             if involved || beside == slot || moved < 0.5 {
                 continue;
             }
-            for (rows, is_put) in [(&mut self.window, demonstrated > 0.25), (&mut self.state, seen > 0.25)] {
+            let demonstrated = demonstrated > 0.25 && self.specification == SpecificationForm::Trajectories;
+            for (rows, is_put) in [(&mut self.window, demonstrated), (&mut self.state, seen > 0.25)] {
                 if is_put {
                     put_beside(rows, self.n_slots, slot, beside, offset);
                 }

@@ -10,7 +10,7 @@ use rand::Rng;
 use crate::model::Windows;
 use crate::program::Program;
 use crate::seed::Seed;
-use crate::trace::{Observation, ScopingLabel};
+use crate::trace::{Observation, ScopingLabel, SpecificationForm};
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
@@ -138,10 +138,10 @@ fn prepare_run(examples: &Examples<'_>, config: &TrainConfig, run: Vec<Example>,
 fn prepare(examples: &Examples<'_>, config: &TrainConfig, example: Example, rng: &mut impl Rng) -> Views {
     let data = examples.data();
     let width = Observation::width(data.n_slots);
-    let rows = &data.trials[example.demonstration].observations;
     let mut views = Views {
         n_slots: data.n_slots,
-        window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
+        specification: examples.specification(),
+        window: examples.specification_rows(example.demonstration, example.window),
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
         example,
     };
@@ -153,7 +153,10 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
     let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
-    let windows = Windows::new(n_slots, &slices);
+    let windows = match examples.specification() {
+        SpecificationForm::Trajectories => Windows::new(n_slots, &slices),
+        SpecificationForm::Instructions => Windows::of_instructions(n_slots, &slices),
+    };
     let weight = 1.0 / counts.examples as f32;
     let one_hot = |width: usize, hot: Option<usize>, value: f32| {
         (0..width).map(move |column| if Some(column) == hot { value } else { 0.0 })
@@ -164,7 +167,9 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         .collect();
     let arguments = part.iter().any(|prepared| prepared.example.argument.is_some()).then(|| {
         let value = 1.0 / counts.arguments as f32;
-        part.iter().flat_map(|prepared| one_hot(n_slots, prepared.example.argument.map(|slot| usize::from(slot.0)), value)).collect()
+        part.iter()
+            .flat_map(|prepared| one_hot(n_slots, prepared.example.argument.map(|slot| usize::from(slot.0)), value))
+            .collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));

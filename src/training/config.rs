@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{EncoderKind, Variant};
+use crate::trace::SpecificationForm;
 use crate::training::TrainError;
 
 /// What is trained, and how.
@@ -12,6 +13,8 @@ use crate::training::TrainError;
 pub struct Training {
     /// The kind of network.
     pub variant: Variant,
+    /// What it reads as task specification.
+    pub specification: SpecificationForm,
     /// What parameters, batches and augmentations are drawn from.
     pub seed: u64,
     /// How.
@@ -19,6 +22,31 @@ pub struct Training {
 }
 
 impl Training {
+    /// Whether the settings make sense together.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::Config`] for the first that does not, with what is allowed.
+    pub fn check(&self) -> Result<(), TrainError> {
+        self.config.check()?;
+        if self.specification == SpecificationForm::Trajectories {
+            return Ok(());
+        }
+        let refuse = |key, found, allowed| Err(TrainError::Config { key, found, allowed });
+        if self.variant != Variant::Ntp {
+            let found = format!("{} with variant {}", self.specification, self.variant);
+            return refuse("specification", found, "instructions with variant ntp alone");
+        }
+        let shares = [
+            ("relabel_slots", self.config.relabel_slots.unwrap_or(0.0)),
+            ("merge_containers", self.config.merge_containers),
+        ];
+        match shares.into_iter().find(|(_, share)| *share > 0.0) {
+            Some((key, share)) => refuse(key, share.to_string(), "0 with instructions, whose words name slots"),
+            None => Ok(()),
+        }
+    }
+
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {

@@ -11,7 +11,7 @@ use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split};
-use ntp::trace::{Observation, Span};
+use ntp::trace::{Observation, Span, SpecificationForm};
 use proptest::prelude::{ProptestConfig, prop, prop_assert, proptest};
 use rand::Rng as _;
 
@@ -351,7 +351,7 @@ fn store(folder: &std::path::Path, config: &ModelConfig, weights: &[u8]) {
 }
 
 fn config(variant: Variant) -> ModelConfig {
-    ModelConfig::new(variant, Family::BlockStacking, 8, serde_json::Value::Null)
+    ModelConfig::new(variant, SpecificationForm::default(), Family::BlockStacking, 8, serde_json::Value::Null)
 }
 
 #[test]

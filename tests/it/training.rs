@@ -11,7 +11,7 @@ use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
-use ntp::trace::{Actor, Episode, Provenance, Span, instructions};
+use ntp::trace::{Actor, Episode, Provenance, Span, SpecificationForm, instructions};
 use ntp::training::{
     Curriculum, Example, Examples, Grain, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
     Training, draw, train,
@@ -45,7 +45,7 @@ fn towers() -> DatasetTrials {
 }
 
 fn ntp(config: TrainConfig) -> Training {
-    Training { variant: Variant::Ntp, seed: 0, config }
+    Training { variant: Variant::Ntp, specification: SpecificationForm::default(), seed: 0, config }
 }
 
 fn resolved(config: TrainConfig) -> TrainConfig {
