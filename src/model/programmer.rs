@@ -11,7 +11,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::model::core_network::{Core, GruCore, Reactive};
 use crate::model::decisions::Decisions;
-use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
+use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
 use crate::model::layers::{Init, repeat_row};
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CoreOutput, Network};

@@ -3,10 +3,10 @@
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    CONFIG_FILE, Cell, Decisions, Decoder, Flattened, FlattenedConfig, Gru, Instructed, InstructedConfig, LabelScores,
-    Lstm, ModelConfig, ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory,
-    ScopeHead, Sentences, Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes,
-    with_network,
+    CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Gru, Instructed, InstructedConfig,
+    LabelScores, Lstm, ModelConfig, ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig,
+    ProgramMemory, ScopeHead, Sentences, Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score,
+    weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
