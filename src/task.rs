@@ -17,7 +17,7 @@ mod set;
 pub use file::TaskFileError;
 pub use goal::{Condition, Goal, condition_holds, goal_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
-pub use layout::{Trial, initial_state, scene};
+pub use layout::{CONTAINER_HALF_M, Trial, initial_state, scene};
 pub use sampler::{SampleError, sample, split_limits};
 pub use set::{TaskSet, TaskSetError};
 

@@ -11,18 +11,24 @@ mod boundaries;
 mod call;
 mod episode;
 mod frame;
+mod instruction;
 mod outcome;
 mod push;
 mod recorder;
 mod rules;
 mod span;
+mod specification;
 
 pub use boundaries::{Boundaries, RecordedFrames};
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
 pub use frame::{Frame, Observation};
+pub use instruction::{
+    Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
+};
 pub use outcome::{Cause, Outcome};
 pub use push::Push;
 pub use recorder::{CallRecorder, NewCall};
 pub use rules::{CallProblem, TraceError, check_calls};
 pub use span::{ScopingLabel, Span};
+pub use specification::SpecificationForm;

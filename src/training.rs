@@ -160,12 +160,12 @@ pub fn train(
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
-    training.config.check()?;
+    training.check()?;
     let training = training.resolved();
     let family = family(data)?;
     let written =
         serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let mut model = ModelConfig::new(training.variant, family, data.n_slots, written);
+    let mut model = ModelConfig::new(training.variant, training.specification, family, data.n_slots, written);
     if training.variant.architecture() == Architecture::Npi {
         model.tasks = Examples::new(data)?.task_ids();
     }
@@ -191,7 +191,7 @@ impl NetworkUse for Learning<'_, '_> {
     fn run<N: Network>(self, network: N) -> Self::Output {
         let Self { config, data, model, folder, seed, hooks } = self;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
-        let examples = Examples::of(data, N::DECISIONS, grain)?;
+        let examples = Examples::of(data, model.network.specification(), N::DECISIONS, grain)?;
         Run { config, examples: &examples, model, folder, seed }.train(network, hooks)
     }
 }
@@ -218,6 +218,7 @@ fn dataset_hash(data: &DatasetTrials) -> String {
         hasher.update(trial.split.name());
         hasher.update([trial.trial.to_le_bytes(), (trial.n_frames as u32).to_le_bytes()].concat());
         trial.observations.iter().for_each(|value| hasher.update(value.to_le_bytes()));
+        trial.instructions.iter().flat_map(|said| said.words).for_each(|word| hasher.update(word.to_le_bytes()));
     }
     artifact::hex(&hasher.finalize())
 }

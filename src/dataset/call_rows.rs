@@ -6,7 +6,7 @@ use crate::dataset::episode_rows::EpisodeRow;
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::table::{Columns, TableError};
-use crate::trace::{CallId, ProgramCall, Span};
+use crate::trace::{CallId, Instruction, ProgramCall, Span, Vocabulary};
 
 /// Columns of `ntp/calls/`.
 pub(crate) struct CallBatch {
@@ -107,4 +107,35 @@ pub(crate) fn read_calls(
         }
     }
     Ok(())
+}
+
+/// The instructions in `ntp/calls/`.
+pub(crate) struct InstructionBatch {
+    instruction: Vec<Option<String>>,
+}
+
+impl Batch for InstructionBatch {
+    const COLUMNS: &'static [&'static str] = &["instruction"];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self { instruction: columns.optional_text("instruction")? })
+    }
+}
+
+/// Reads the instructions of the next episode.
+pub(crate) fn read_instructions(
+    cursor: &mut Cursor<InstructionBatch>,
+    row: &EpisodeRow,
+) -> Result<Vec<Instruction>, DatasetError> {
+    let vocabulary = Vocabulary::new(row.slots.iter().map(String::as_str));
+    let mut instructions = Vec::new();
+    for call in 0..row.n_calls {
+        let (batch, at) = cursor.next(row.calls)?;
+        let words = batch.instruction[at].as_ref().map(|sentence| vocabulary.words(sentence)).transpose();
+        match words {
+            Ok(words) => instructions.extend(words.map(|words| Instruction { call: CallId(call as u32), words })),
+            Err(unknown) => return Err(cursor.problem(unknown.to_string())),
+        }
+    }
+    Ok(instructions)
 }

@@ -6,7 +6,7 @@ use crate::dataset::episode_view::{CallSpans, EpisodeView};
 use crate::dataset::text::TextTable;
 use crate::program::Program;
 use crate::table::{Values, WriteOptions};
-use crate::trace::{ProgramCall, ScopingLabel};
+use crate::trace::{ProgramCall, ScopingLabel, sentence};
 
 /// Calls that are not yet written.
 #[derive(Default)]
@@ -26,8 +26,10 @@ pub(crate) struct CallRows {
     frame_begin: Vec<i64>,
     frame_end: Vec<i64>,
     end_of_program: Vec<bool>,
+    instruction: Vec<Option<u32>>,
     programs: Vec<String>,
     slots: TextTable,
+    sentences: TextTable,
 }
 
 impl CallRows {
@@ -63,8 +65,11 @@ impl CallRows {
 
     /// Adds an episode's calls.
     pub(crate) fn append(&mut self, view: &EpisodeView<'_>, episode_index: i64) {
-        for (call, spans) in view.episode.calls.iter().zip(view.spans) {
+        let (calls, scene) = (&view.episode.calls, &view.episode.scene);
+        for (position, (call, spans)) in calls.iter().zip(view.spans).enumerate() {
             self.append_call(view, call, *spans);
+            let sentence = sentence(calls, position, |slot| &scene.slots[slot].name);
+            self.instruction.push(sentence.map(|sentence| self.sentences.key(&sentence)));
         }
         self.episode_index.resize(self.call_id.len(), episode_index);
     }
@@ -87,7 +92,7 @@ impl CallRows {
     }
 
     /// The columns of all rows.
-    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); 15] {
+    pub(crate) fn columns(&self) -> [(&'static str, Values<'_>); 16] {
         [
             ("episode_index", Values::Int64(&self.episode_index)),
             ("call_id", Values::Int64(&self.call_id)),
@@ -104,6 +109,7 @@ impl CallRows {
             ("frame_begin", Values::Int64(&self.frame_begin)),
             ("frame_end", Values::Int64(&self.frame_end)),
             ("end_of_program", Values::Boolean(&self.end_of_program)),
+            ("instruction", Values::OptionalWord(&self.instruction, self.sentences.texts())),
         ]
     }
 
@@ -118,6 +124,7 @@ impl CallRows {
             .for_each(Vec::clear);
         self.program.clear();
         self.argument.clear();
+        self.instruction.clear();
         self.end_of_program.clear();
     }
 }

@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use crate::dataset::call_rows::read_calls;
+use crate::dataset::call_rows::{read_calls, read_instructions};
 use crate::dataset::cursor::Cursor;
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
 use crate::dataset::frame_map::FrameMap;
@@ -32,12 +32,14 @@ pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
     let width = crate::trace::Observation::width(n_slots);
     let mut frame_cursor = Cursor::new(root, layout::DATA, FRAMES);
     let mut call_cursor = Cursor::new(root, layout::CALLS, CALLS);
+    let mut instruction_cursor = Cursor::new(root, layout::CALLS, CALLS);
     let mut trials = Vec::new();
     let mut calls = Vec::new();
     while let Some(row) = rows.next() {
         let row = row?;
         let frames = read_frames(&mut frame_cursor, &row, width)?;
         read_calls(&mut call_cursor, &row, &mut calls)?;
+        let instructions = read_instructions(&mut instruction_cursor, &row)?;
         if row.is_success {
             let of_episode =
                 |problem| DatasetError::Episode { path: rows.path().to_owned(), episode: row.episode_index, problem };
@@ -48,11 +50,13 @@ pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
                 call,
                 problem,
             })?;
-            trials.push(trial(&row, frames, &calls, width).map_err(of_episode)?);
+            let trial = trial(&row, frames, &calls, width).map_err(of_episode)?;
+            trials.push(TrialData { instructions, ..trial });
         }
     }
     frame_cursor.finish()?;
     call_cursor.finish()?;
+    instruction_cursor.finish()?;
     Ok(DatasetTrials { n_slots, trials })
 }
 
@@ -120,5 +124,6 @@ fn trial(row: &EpisodeRow, frames: EpisodeFrames, calls: &[ProgramCall], width: 
         n_frames: frames.observations.len() / width,
         observations: frames.observations,
         calls: calls.iter().map(on_boundaries).collect::<Result<_, _>>()?,
+        instructions: Vec::new(),
     })
 }

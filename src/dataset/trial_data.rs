@@ -1,7 +1,7 @@
 //! What a learner reads from a dataset: boundary observations and call trees, nothing else.
 
 use crate::task::{Family, Split};
-use crate::trace::ProgramCall;
+use crate::trace::{Instruction, ProgramCall};
 
 /// One episode as a learner sees it.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,8 @@ pub struct TrialData {
     pub observations: Vec<f32>,
     /// The call tree; spans count boundary frames.
     pub calls: Vec<ProgramCall>,
+    /// What was done, in words, in the order of the calls.
+    pub instructions: Vec<Instruction>,
 }
 
 /// A dataset in memory.

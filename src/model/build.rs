@@ -5,6 +5,7 @@ use burn::tensor::Device;
 use crate::model::config::{ModelConfig, NetworkConfig};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::Flattened;
+use crate::model::instructed::Instructed;
 use crate::model::network::Network;
 use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
 use crate::model::object_centric::ObjectCentric;
@@ -28,6 +29,7 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
             of_encoder::<ObjectCentric, BySlot, U>(config, widths, seed, device, wanted)
         }
         NetworkConfig::Flattened(widths) => of_encoder::<Flattened, ByVector, U>(config, widths, seed, device, wanted),
+        NetworkConfig::Instructed(widths) => wanted.run(Ntp::<Instructed>::new(widths, config.n_slots, seed, device)),
     }
 }
 

@@ -3,10 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::flattened::FlattenedConfig;
+use crate::model::instructed::InstructedConfig;
 use crate::model::object_centric::ObjectCentricConfig;
 use crate::model::variant::{EncoderKind, Variant};
 use crate::program::vocabulary_hash;
 use crate::task::Family;
+use crate::trace::SpecificationForm;
 
 /// The widths of a network, by its encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,22 +18,34 @@ pub enum NetworkConfig {
     ObjectCentric(ObjectCentricConfig),
     /// Of [`EncoderKind::Flattened`].
     Flattened(FlattenedConfig),
+    /// Of variant `ntp` with instructions for a specification.
+    Instructed(InstructedConfig),
 }
 
 impl NetworkConfig {
-    /// A variant's default.
-    pub fn of(variant: Variant) -> Self {
-        match variant.encoder() {
-            EncoderKind::ObjectCentric => Self::ObjectCentric(ObjectCentricConfig::default()),
-            EncoderKind::Flattened => Self::Flattened(FlattenedConfig::default()),
+    /// A variant's default. Instructions are for variant `ntp` alone; for another the widths are not its own.
+    pub fn of(variant: Variant, specification: SpecificationForm) -> Self {
+        match (specification, variant.encoder()) {
+            (SpecificationForm::Instructions, _) => Self::Instructed(InstructedConfig::default()),
+            (_, EncoderKind::ObjectCentric) => Self::ObjectCentric(ObjectCentricConfig::default()),
+            (_, EncoderKind::Flattened) => Self::Flattened(FlattenedConfig::default()),
         }
     }
 
-    /// Whose widths they are.
-    pub fn encoder(&self) -> EncoderKind {
+    /// What the network reads as task specification.
+    pub fn specification(&self) -> SpecificationForm {
         match self {
-            Self::ObjectCentric(_) => EncoderKind::ObjectCentric,
-            Self::Flattened(_) => EncoderKind::Flattened,
+            Self::ObjectCentric(_) | Self::Flattened(_) => SpecificationForm::Trajectories,
+            Self::Instructed(_) => SpecificationForm::Instructions,
+        }
+    }
+
+    /// Whether they are a variant's.
+    pub fn is_for(&self, variant: Variant) -> bool {
+        match self {
+            Self::ObjectCentric(_) => variant.encoder() == EncoderKind::ObjectCentric,
+            Self::Flattened(_) => variant.encoder() == EncoderKind::Flattened,
+            Self::Instructed(_) => variant == Variant::Ntp,
         }
     }
 }
@@ -64,7 +78,13 @@ impl ModelConfig {
     pub const VERSION: u32 = 2;
 
     /// A model of a variant's default widths and the current vocabulary, which knows no task by name.
-    pub fn new(variant: Variant, family: Family, n_slots: usize, training: serde_json::Value) -> Self {
+    pub fn new(
+        variant: Variant,
+        specification: SpecificationForm,
+        family: Family,
+        n_slots: usize,
+        training: serde_json::Value,
+    ) -> Self {
         Self {
             version: Self::VERSION,
             variant,
@@ -72,7 +92,7 @@ impl ModelConfig {
             n_slots,
             vocabulary: vocabulary_hash(),
             tasks: Vec::new(),
-            network: NetworkConfig::of(variant),
+            network: NetworkConfig::of(variant, specification),
             training,
         }
     }

@@ -111,6 +111,18 @@ pub(crate) fn repeat_row(row: Tensor<2>, n_rows: usize) -> Tensor<2> {
     row.expand([n_rows, width])
 }
 
+/// Each frame, and the most of what came before it, which tells whether a segment that is still to do lies there.
+///
+/// # Shapes
+///
+/// `[B, T, H]` → `[B, T, 2 H]`; features must never be negative
+pub(crate) fn with_most_before(frames: Tensor<3>) -> Tensor<3> {
+    let [n_batch, n_frames, width] = frames.dims();
+    let first = Tensor::zeros([n_batch, 1, width], &frames.device());
+    let before = Tensor::cat(vec![first, frames.clone()], 1).narrow(1, 0, n_frames).cummax(1);
+    Tensor::cat(vec![frames, before], 2)
+}
+
 /// The largest over the frames of rectified (never negative) features; frames beyond the window must be zero.
 ///
 /// # Shapes

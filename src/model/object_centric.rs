@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
-use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
+use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, with_most_before};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
@@ -192,13 +192,8 @@ impl Encoder for ObjectCentric {
         reading.state.clone()
     }
 
-    /// Each frame, and the most of what came before it, which tells whether a segment that is still to do lies there.
     fn frames(reading: &ObjectReading) -> Tensor<3> {
-        let frames = reading.frames.clone();
-        let [n_batch, n_frames, width] = frames.dims();
-        let first = Tensor::zeros([n_batch, 1, width], &frames.device());
-        let before = Tensor::cat(vec![first, frames.clone()], 1).narrow(1, 0, n_frames).cummax(1);
-        Tensor::cat(vec![frames, before], 2)
+        with_most_before(reading.frames.clone())
     }
 
     fn device(&self) -> Device {

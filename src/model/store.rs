@@ -60,7 +60,7 @@ pub enum ModelError {
     /// The model is for other scenes.
     #[error("model is for {field} {found}, but {expected} is asked for: {}", path.display())]
     Purpose {
-        /// `variant`, `family` or `n_slots`.
+        /// `variant`, `family`, `specification` or `n_slots`.
         field: &'static str,
         /// As found.
         found: String,
@@ -121,7 +121,7 @@ pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
     if config.vocabulary != expected {
         return Err(ModelError::Vocabulary { found: config.vocabulary, expected, path });
     }
-    if config.variant.encoder() != config.network.encoder() {
+    if !config.network.is_for(config.variant) {
         return Err(ModelError::Network { variant: config.variant, path });
     }
     Ok(config)
@@ -136,6 +136,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
     let fields = [
         ("variant", config.variant.to_string(), wanted.variant.to_string()),
         ("family", config.family.name().to_owned(), wanted.family.name().to_owned()),
+        ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
         ("n_slots", config.n_slots.to_string(), wanted.n_slots.to_string()),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {

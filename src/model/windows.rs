@@ -3,7 +3,10 @@
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::features::Rows;
-use crate::trace::Observation;
+use crate::trace::{MAX_WORDS, Observation};
+
+/// A score that no softmax lets through.
+const HIDDEN_SCORE: f32 = 1e4;
 
 /// A batch of specification windows, padded at their ends to the longest.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +20,10 @@ pub struct Windows {
 impl Windows {
     /// Stacks windows, each of observation rows of `n_slots` slots.
     pub fn new(n_slots: usize, windows: &[&[f32]]) -> Self {
-        let width = Observation::width(n_slots);
+        Self::stack(n_slots, Observation::width(n_slots), windows)
+    }
+
+    fn stack(n_slots: usize, width: usize, windows: &[&[f32]]) -> Self {
         let lengths: Vec<usize> = windows.iter().map(|window| window.len() / width).collect();
         let n_frames = lengths.iter().copied().max().unwrap_or(0);
         let mut rows = vec![0.0; windows.len() * n_frames * width];
@@ -40,6 +46,24 @@ impl Windows {
     /// Slots of each observation.
     pub fn n_slots(&self) -> usize {
         self.n_slots
+    }
+
+    /// Stacks windows of instructions: rows of [`crate::trace::Words`], as numbers.
+    pub fn of_instructions(n_slots: usize, windows: &[&[f32]]) -> Self {
+        Self::stack(n_slots, MAX_WORDS, windows)
+    }
+
+    /// Which words of a vocabulary of `n_words` each sentence has: `[windows * frames, n_words]`.
+    pub(crate) fn bags_of_words(&self, n_words: usize) -> Vec<f32> {
+        let mut bags = vec![0.0; self.rows.len() / MAX_WORDS * n_words];
+        for (sentence, bag) in self.rows.chunks_exact(MAX_WORDS).zip(bags.chunks_exact_mut(n_words)) {
+            for &word in sentence.iter().filter(|word| **word > 0.0) {
+                if let Some(has) = bag.get_mut(word as usize) {
+                    *has = 1.0;
+                }
+            }
+        }
+        bags
     }
 
     pub(crate) fn rows(&self) -> Rows<'_> {
@@ -83,6 +107,14 @@ impl Padding {
         match padding {
             Some(padding) => objects * padding.valid.clone().unsqueeze_dim(3),
             None => objects,
+        }
+    }
+
+    /// Far below zero beyond the window, for a softmax over frames.
+    pub(crate) fn hide(padding: Option<&Self>, scores: Tensor<3>) -> Tensor<3> {
+        match padding {
+            Some(padding) => scores + (padding.valid.clone() - 1.0) * HIDDEN_SCORE,
+            None => scores,
         }
     }
 

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::artifact::StageDir;
-use crate::model::Variant;
+use crate::pipeline::ModelSpec;
 use crate::pipeline::Stage;
+use crate::trace::SpecificationForm;
 
 /// A run directory.
 #[derive(Clone, Debug)]
@@ -64,9 +65,11 @@ impl RunDir {
 }
 
 /// The folder name of a trained model.
-pub(super) fn model_name(variant: Variant, train_tasks: Option<u32>, seed: u64) -> String {
-    match train_tasks {
-        Some(tasks) => format!("{}-tasks{tasks}-seed{seed}", variant.name()),
-        None => format!("{}-seed{seed}", variant.name()),
-    }
+pub(super) fn model_name(spec: &ModelSpec, seed: u64) -> String {
+    let specification = match spec.specification {
+        SpecificationForm::Trajectories => String::new(),
+        form @ SpecificationForm::Instructions => format!("-{form}"),
+    };
+    let tasks = spec.train_tasks.map(|tasks| format!("-tasks{tasks}")).unwrap_or_default();
+    format!("{}{specification}{tasks}-seed{seed}", spec.variant)
 }

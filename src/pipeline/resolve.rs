@@ -141,13 +141,13 @@ impl Pipeline {
                 return Err(self.value(&format!("models[{idx}].train_tasks"), problem));
             }
             for &seed in &model.seeds {
-                let name = super::layout::model_name(model.variant, model.train_tasks, seed);
+                let name = super::layout::model_name(model, seed);
                 if names.contains(&name) {
                     return Err(self.value(&format!("models[{idx}]"), format!("{name} is there twice")));
                 }
                 names.push(name);
             }
-            if let Err(problem) = model.training.check() {
+            if let Err(problem) = model.training(model.seeds[0]).check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
             self.check_acting(idx, model)?;

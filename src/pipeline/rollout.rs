@@ -18,14 +18,12 @@ use crate::recording::ShardWriter;
 use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
 use crate::seed::Seed;
 use crate::task::{Split, Task, TaskSet};
-use crate::trace::{Actor, Episode, Provenance};
+use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
 /// How often the expert may try to demonstrate a task for a suite, each time from other initial positions.
 const DEMONSTRATION_ATTEMPTS: u64 = 20;
-/// What a policy is told to do by: the demonstration's observations.
-const TRAJECTORIES: &str = "trajectories";
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
@@ -79,7 +77,7 @@ fn actors(context: &Context<'_>) -> Vec<Option<ModelActor>> {
 fn actor_name(context: &Context<'_>, actor: Option<ModelActor>) -> String {
     let Some(ModelActor { model, seed, decoder }) = actor else { return "oracle".to_owned() };
     let spec = &context.pipeline.spec.models[model];
-    format!("{}-{}", model_name(spec.variant, spec.train_tasks, seed), decoder.name())
+    format!("{}-{}", model_name(spec, seed), decoder.name())
 }
 
 fn model_inputs(
@@ -88,7 +86,7 @@ fn model_inputs(
     task_inputs: &BTreeMap<String, String>,
 ) -> Result<BTreeMap<String, String>, PipelineError> {
     let spec = &context.pipeline.spec.models[actor.model];
-    let version = context.dir.model(&model_name(spec.variant, spec.train_tasks, actor.seed)).version()?;
+    let version = context.dir.model(&model_name(spec, actor.seed)).version()?;
     let mut inputs = task_inputs.clone();
     inputs.insert(Stage::Train.name().to_owned(), version);
     Ok(inputs)
@@ -124,6 +122,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
 struct Learned {
     folder: PathBuf,
     variant: Variant,
+    specification: SpecificationForm,
     decoder: Decoder,
     acted: Acted,
 }
@@ -135,11 +134,12 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
     let acted = Acted {
         training_seed: seed,
         train_tasks: Some(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
-        specification: Some(TRAJECTORIES),
+        specification: Some(spec.specification.name()),
         decoder: Some(decoder.name()),
     };
-    let name = model_name(spec.variant, spec.train_tasks, seed);
-    Learned { folder: context.dir.model(&name).path().to_owned(), variant: spec.variant, decoder, acted }
+    let name = model_name(spec, seed);
+    let folder = context.dir.model(&name).path().to_owned();
+    Learned { folder, variant: spec.variant, specification: spec.specification, decoder, acted }
 }
 
 impl Learned {
@@ -147,7 +147,8 @@ impl Learned {
     fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
         let (found, policy) = load_policy(&self.folder, self.decoder)?;
         let family = context.pipeline.spec.tasks.family;
-        let wanted = ModelConfig::new(self.variant, family, family.n_slots(), found.training.clone());
+        let wanted =
+            ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
         check_purpose(&found, &wanted, &self.folder)?;
         Ok(policy)
     }

@@ -7,7 +7,8 @@ use crate::dataset::ConvertConfig;
 use crate::model::{Decoder, Variant};
 use crate::sim::{AdversaryConfig, SimulationConfig};
 use crate::task::{Family, Split};
-use crate::training::TrainConfig;
+use crate::trace::SpecificationForm;
+use crate::training::{TrainConfig, Training};
 
 /// One experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -114,6 +115,9 @@ pub struct ModelSpec {
     /// Train on the first so many training tasks; all when left out.
     #[serde(default)]
     pub train_tasks: Option<u32>,
+    /// What it reads as task specification: trajectories, or for variant `ntp` also instructions.
+    #[serde(default)]
+    pub specification: SpecificationForm,
     /// How the chosen part of a demonstration is decoded; with several, each acts every suite. Trained once.
     #[serde(default = "mss")]
     pub decoders: Vec<Decoder>,
@@ -123,6 +127,14 @@ pub struct ModelSpec {
     /// How it is trained.
     #[serde(default)]
     pub training: TrainConfig,
+}
+
+impl ModelSpec {
+    /// One of its training runs.
+    pub fn training(&self, seed: u64) -> Training {
+        let Self { variant, specification, .. } = *self;
+        Training { variant, specification, seed, config: self.training.clone() }
+    }
 }
 
 fn one_seed() -> Vec<u64> {

@@ -11,7 +11,7 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{ModelSpec, PipelineError, Stage, tasks};
 use crate::task::Split;
-use crate::training::{self, Hooks, METRICS_FILE, Training};
+use crate::training::{self, Hooks, METRICS_FILE};
 
 /// What a finished training leaves; checkpoints are not part of it.
 const RESULT_FILES: [&str; 3] = [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE];
@@ -21,7 +21,7 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let inputs = BTreeMap::from([(Stage::Convert.name().to_owned(), version)]);
     let models = context.pipeline.spec.models.iter().enumerate();
     let unit = |(model, spec): (usize, &ModelSpec), seed: u64| {
-        let name = model_name(spec.variant, spec.train_tasks, seed);
+        let name = model_name(spec, seed);
         let config = json!({
             "variant": spec.variant,
             "seed": seed,
@@ -46,7 +46,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let spec = &context.pipeline.spec.models[model];
     let trials = training_trials(context, spec)?;
     unit.dir.begin(&unit.plan)?;
-    let training = Training { variant: spec.variant, seed, config: spec.training.clone() }.resolved();
+    let training = spec.training(seed).resolved();
     let progress = context.progress(unit, u64::from(training.config.n_steps()), "steps");
     let mut shown = 0;
     let mut on_progress = |now: training::Progress| {

@@ -17,7 +17,7 @@ use crate::rollout::divergence::decided_of;
 use crate::rollout::expected_calls;
 use crate::scene::{BodyIndex, Scene, SlotIndex};
 use crate::task::{Family, rests_on};
-use crate::trace::{Episode, Observation, ProgramCall};
+use crate::trace::{Episode, Observation, ProgramCall, SpecificationForm, instruction_spans, instructions};
 
 /// The expert's way through one episode.
 #[derive(Clone, Debug, Default)]
@@ -65,6 +65,19 @@ impl Expectation {
             sub_task.calls = decided_of(decisions, whole, &sub_task.calls);
         }
         Self { sub_tasks, ..Self::default() }
+    }
+
+    /// With the parts of a task specification of a form in place of the demonstration's frames.
+    #[must_use]
+    pub fn specified_in(mut self, form: SpecificationForm, demonstration: &Episode) -> Self {
+        if form == SpecificationForm::Instructions {
+            let calls = &demonstration.calls;
+            let parts = instruction_spans(calls, &instructions(calls, &demonstration.scene.slots));
+            let part = |call: &ProgramCall| parts.get(call.id.0 as usize).copied().flatten();
+            let calls = self.sub_tasks.iter_mut().flat_map(|sub_task| &mut sub_task.calls);
+            calls.for_each(|call| call.output = call.output.and(part(call)));
+        }
+        self
     }
 
     /// The decisions that it takes when nothing goes wrong.

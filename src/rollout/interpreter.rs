@@ -13,7 +13,9 @@ use crate::robot::{Action, RobotApi, judge};
 use crate::rollout::divergence::divergence;
 use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
 use crate::task::Task;
-use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Push, TraceError};
+use crate::trace::{
+    CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Push, SpecificationForm, TraceError,
+};
 
 /// An episode about to be acted: a demonstration, and a world of another trial.
 pub struct Start<'t> {
@@ -69,7 +71,7 @@ pub struct RolloutEpisode {
 /// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
 pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
     let mut running: Vec<Running<'_>> =
-        starts.into_iter().map(|start| Running::new(start, policy.decides(), limits)).collect();
+        starts.into_iter().map(|start| Running::new(start, policy.decides(), policy.reads(), limits)).collect();
     loop {
         let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
         if queries.is_empty() {
@@ -103,11 +105,12 @@ struct Running<'t> {
 }
 
 impl<'t> Running<'t> {
-    fn new(start: Start<'t>, decisions: Decisions, limits: Limits) -> Self {
+    fn new(start: Start<'t>, decisions: Decisions, reads: SpecificationForm, limits: Limits) -> Self {
         let Start { task, demonstration, world, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expectation = Expectation::new(decisions, &demonstration, world.scene());
-        let specification = Arc::new(Specification::of(&demonstration));
+        let expectation =
+            Expectation::new(decisions, &demonstration, world.scene()).specified_in(reads, &demonstration);
+        let specification = Arc::new(Specification::in_form(reads, &demonstration));
         Self {
             task,
             world,

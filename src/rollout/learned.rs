@@ -24,7 +24,7 @@ use crate::model::{
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, Query, Specification};
 use crate::scene::SlotIndex;
-use crate::trace::{Prediction, ScopingLabel, Span};
+use crate::trace::{Prediction, ScopingLabel, Span, SpecificationForm};
 
 /// A program ends when its end is at least this likely (the paper's alpha).
 const END_THRESHOLD: f32 = 0.5;
@@ -36,7 +36,12 @@ const END_THRESHOLD: f32 = 0.5;
 /// As [`model::load`].
 pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
     let config = model::load_config(folder)?;
-    let deciding = Deciding { name: config.variant.name(), decoder, tasks: config.tasks.clone() };
+    let deciding = Deciding {
+        name: config.variant.name(),
+        reads: config.network.specification(),
+        decoder,
+        tasks: config.tasks.clone(),
+    };
     let policy = model::load(folder, &config, deciding)?;
     Ok((config, policy))
 }
@@ -44,6 +49,7 @@ pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<
 /// Makes a policy of a network.
 struct Deciding {
     name: &'static str,
+    reads: SpecificationForm,
     decoder: Decoder,
     tasks: Vec<String>,
 }
@@ -52,13 +58,14 @@ impl NetworkUse for Deciding {
     type Output = Box<dyn Policy + Send>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        Box::new(LearnedPolicy::new(self.name, network, self.decoder).knowing(self.tasks))
+        Box::new(LearnedPolicy::new(self.name, network, self.decoder).reading(self.reads).knowing(self.tasks))
     }
 }
 
 /// A network that decides.
 pub struct LearnedPolicy<N: Network> {
     name: String,
+    reads: SpecificationForm,
     network: N,
     decoder: Decoder,
     /// By address, which the `Arc` in the value keeps from being given to another specification.
@@ -89,10 +96,24 @@ struct Known<D> {
 }
 
 impl<N: Network> LearnedPolicy<N> {
-    /// A policy of the given name. The network is used without gradients.
+    /// A policy of the given name that reads trajectories. The network is used without gradients.
     pub fn new(name: &str, network: N, decoder: Decoder) -> Self {
         let (demonstrations, stacks) = (HashMap::new(), HashMap::new());
-        Self { name: name.to_owned(), network: network.valid(), decoder, demonstrations, stacks, tasks: Vec::new() }
+        Self {
+            name: name.to_owned(),
+            reads: SpecificationForm::default(),
+            network: network.valid(),
+            decoder,
+            demonstrations,
+            stacks,
+            tasks: Vec::new(),
+        }
+    }
+
+    /// The same, reading task specifications of a form.
+    #[must_use]
+    pub fn reading(self, reads: SpecificationForm) -> Self {
+        Self { reads, ..self }
     }
 
     /// The same for a network that knows tasks by name, in the order of its rows.
@@ -116,8 +137,7 @@ impl<N: Network> LearnedPolicy<N> {
             .into_par_iter()
             .map(|specification| Known {
                 specification: Arc::clone(specification),
-                demonstration: network
-                    .demonstration(&Windows::new(specification.n_slots, &[specification.observations.as_slice()])),
+                demonstration: network.demonstration(&windows(specification)),
             })
             .collect();
         self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
@@ -204,6 +224,10 @@ impl<N: Network> Policy for LearnedPolicy<N> {
         N::DECISIONS
     }
 
+    fn reads(&self) -> SpecificationForm {
+        self.reads
+    }
+
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
         self.refresh(queries);
         let running: Vec<_> = queries.iter().map(|query| self.running(query)).collect();
@@ -214,6 +238,14 @@ impl<N: Network> Policy for LearnedPolicy<N> {
             decision
         };
         queries.iter().zip(decided).map(remember).collect()
+    }
+}
+
+fn windows(specification: &Specification) -> Windows {
+    let rows = [specification.rows.as_slice()];
+    match specification.form {
+        SpecificationForm::Trajectories => Windows::new(specification.n_slots, &rows),
+        SpecificationForm::Instructions => Windows::of_instructions(specification.n_slots, &rows),
     }
 }
 

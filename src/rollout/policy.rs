@@ -5,19 +5,21 @@ use std::sync::Arc;
 use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::trace::{Episode, Observation, Prediction, Span};
+use crate::trace::{Episode, Observation, Prediction, Span, SpecificationForm, instructions};
 
-/// A demonstration as a policy sees it: its boundary observations.
+/// A task specification as a policy sees it: a demonstration's boundary observations, or its instructions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Specification {
     /// The name of the task, for a policy that knows tasks by name. It says nothing of what is to be done.
     pub task_id: String,
     /// Slots of each observation.
     pub n_slots: usize,
-    /// Boundary frames.
+    /// In which form it is given.
+    pub form: SpecificationForm,
+    /// Boundary frames, or sentences.
     pub n_frames: usize,
-    /// `[n_frames, 3 * n_slots + 2]`, row by row.
-    pub observations: Vec<f32>,
+    /// `[n_frames, 3 * n_slots + 2]`, or `[n_frames, MAX_WORDS]` of words as numbers, row by row.
+    pub rows: Vec<f32>,
 }
 
 impl Specification {
@@ -73,6 +75,11 @@ pub trait Policy {
         Decisions::Scoped
     }
 
+    /// The form of task specification that it reads.
+    fn reads(&self) -> SpecificationForm {
+        SpecificationForm::Trajectories
+    }
+
     /// One decision a query, in order. Must not depend on which queries come together, but may on earlier ones of the
     /// same running call.
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;
@@ -86,12 +93,29 @@ impl Decision {
 }
 
 impl Specification {
+    /// What an episode specifies, in the form that is asked for.
+    pub fn in_form(form: SpecificationForm, episode: &Episode) -> Self {
+        match form {
+            SpecificationForm::Trajectories => Self::of(episode),
+            SpecificationForm::Instructions => Self::instructions(episode),
+        }
+    }
+
+    /// The instructions of an episode.
+    pub fn instructions(episode: &Episode) -> Self {
+        let instructions = instructions(&episode.calls, &episode.scene.slots);
+        let rows = instructions.iter().flat_map(|instruction| instruction.words).map(f32::from).collect();
+        let (n_slots, n_frames) = (episode.scene.slots.len(), instructions.len());
+        let task_id = episode.provenance.task_id.clone();
+        Self { task_id, n_slots, form: SpecificationForm::Instructions, n_frames, rows }
+    }
+
     /// The boundary frames of an episode.
     pub fn of(episode: &Episode) -> Self {
-        let observations: Vec<f32> =
-            episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
+        let rows: Vec<f32> = episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
         let n_slots = episode.scene.slots.len();
+        let n_frames = rows.len() / Observation::width(n_slots);
         let task_id = episode.provenance.task_id.clone();
-        Self { task_id, n_slots, n_frames: observations.len() / Observation::width(n_slots), observations }
+        Self { task_id, n_slots, form: SpecificationForm::Trajectories, n_frames, rows }
     }
 }

@@ -37,6 +37,8 @@ const CONTAINER_Y_M: f32 = 0.34;
 const CONTAINER_PITCH_M: f32 = 0.26;
 const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
+/// Half of a container's outer width and depth.
+pub const CONTAINER_HALF_M: f32 = CONTAINER_INNER_M[0] + CONTAINER_WALL_M;
 
 /// The most instances of one category.
 pub(super) const MAX_INSTANCES: u16 = 10;

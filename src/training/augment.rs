@@ -4,14 +4,16 @@
 //!
 //! Rows are [`crate::trace::Observation::to_flat`]: positions relative to the gripper, then (open, closed).
 
+mod containers;
+
 use rand::Rng;
 use rand::seq::SliceRandom as _;
 
-use crate::model::Given;
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
 use crate::task::Family;
-use crate::trace::Observation;
+use crate::trace::{Observation, SpecificationForm};
+use crate::training::augment::containers::Merge;
 use crate::training::config::TrainConfig;
 use crate::training::examples::Example;
 
@@ -23,53 +25,53 @@ const SCATTER_M: [f32; 3] = [0.08, 0.08, 0.04];
 /// An example's own copies of what augmentations change.
 pub(super) struct Views {
     pub(super) n_slots: usize,
-    /// Rows of the demonstration's window.
+    pub(super) specification: SpecificationForm,
+    /// Rows of the window of the task specification.
     pub(super) window: Vec<f32>,
     /// The row that is seen now.
     pub(super) state: Vec<f32>,
-    /// The slots that are arguments.
-    pub(super) arguments: Vec<SlotIndex>,
-    /// What the running program was called with.
-    pub(super) given: Given,
+    /// The decision; its labels change with what is seen.
+    pub(super) example: Example,
 }
 
 impl Views {
     /// Applies what the settings ask for. The number of draws before an augmentation does not depend on the settings:
     /// one that is switched off changes no other.
-    pub(super) fn augment(&mut self, family: Family, config: &TrainConfig, example: &Example, rng: &mut impl Rng) {
-        let [relabelled, jittered, scattered]: [f32; 3] = rng.random();
-        let order = relabelling(family, self.n_slots, rng);
+    pub(super) fn augment(&mut self, family: Family, config: &TrainConfig, rng: &mut impl Rng) {
+        let [merged, scattered, jittered, relabelled]: [f32; 4] = rng.random();
+        let merge = Merge::draw(family, self.n_slots, rng);
         let place = Place::draw(self.n_slots, rng);
-        if scattered < config.scatter_bystanders {
-            self.scatter(example, rng);
+        let order = relabelling(family, self.n_slots, rng);
+        if let Some(merge) = merge.filter(|_| merged < config.merge_containers) {
+            merge.apply(self);
         }
-        if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(example, &self.state) {
-            place.put_gripper(&mut self.state, example.next_move);
+        if scattered < config.scatter_bystanders {
+            self.scatter(rng);
+        }
+        if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(&self.example, &self.state) {
+            place.put_gripper(&mut self.state, self.example.next_move);
         }
         if relabelled < config.relabel_slots.unwrap_or_default() {
             self.window.chunks_exact_mut(Observation::width(self.n_slots)).for_each(|row| relabel(row, &order));
             relabel(&mut self.state, &order);
-            let label = |slot: &mut SlotIndex| {
-                let found = order.iter().position(|&shown| shown == usize::from(slot.0));
-                *slot = found.map_or(*slot, |label| SlotIndex(label as u16));
-            };
-            self.arguments.iter_mut().for_each(label);
-            self.given.arguments.iter_mut().flatten().for_each(label);
+            let given = self.example.given.arguments.iter_mut().flatten();
+            self.example.arguments.iter_mut().chain(given).for_each(|slot| *slot = label(&order, *slot));
         }
     }
 
     /// Puts about half of the slots that the running program has nothing to do with beside other slots: in the
     /// demonstration, now, or in both.
-    fn scatter(&mut self, example: &Example, rng: &mut impl Rng) {
+    fn scatter(&mut self, rng: &mut impl Rng) {
         for slot in 0..self.n_slots {
             let beside = rng.random_range(0..self.n_slots);
             let offset = SCATTER_M.map(|reach| rng.random_range(-reach..reach));
             let [moved, demonstrated, seen]: [f32; 3] = rng.random();
-            let involved = example.involved.iter().any(|&other| usize::from(other.0) == slot);
+            let involved = self.example.involved.iter().any(|&other| usize::from(other.0) == slot);
             if involved || beside == slot || moved < 0.5 {
                 continue;
             }
-            for (rows, is_put) in [(&mut self.window, demonstrated > 0.25), (&mut self.state, seen > 0.25)] {
+            let demonstrated = demonstrated > 0.25 && self.specification == SpecificationForm::Trajectories;
+            for (rows, is_put) in [(&mut self.window, demonstrated), (&mut self.state, seen > 0.25)] {
                 if is_put {
                     put_beside(rows, self.n_slots, slot, beside, offset);
                 }
@@ -106,6 +108,12 @@ fn relabel(row: &mut [f32], order: &[usize]) {
     for (position, &slot) in row.chunks_exact_mut(3).zip(order) {
         position.copy_from_slice(&shown[3 * slot..3 * slot + 3]);
     }
+}
+
+/// Under which label a slot is shown.
+fn label(order: &[usize], slot: SlotIndex) -> SlotIndex {
+    let shown = order.iter().position(|&shown| shown == usize::from(slot.0));
+    shown.map_or(slot, |label| SlotIndex(label as u16))
 }
 
 /// Whether the decision stays right wherever the gripper is: it is empty, and the next primitive moves it (or none

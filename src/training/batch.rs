@@ -9,10 +9,9 @@ use rand::Rng;
 
 use crate::model::{Given, Windows};
 use crate::program::Program;
-use crate::scene::SlotIndex;
 use crate::seed::Seed;
 use crate::task::Family;
-use crate::trace::{Observation, ScopingLabel};
+use crate::trace::{Observation, ScopingLabel, SpecificationForm};
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
@@ -49,18 +48,9 @@ pub struct Part {
     pub given: Vec<Given>,
 }
 
-/// One example with its own copies of what augmentations change.
-struct Prepared {
-    example: Example,
-    window: Vec<f32>,
-    state: Vec<f32>,
-    arguments: Vec<SlotIndex>,
-    given: Given,
-}
-
 /// Decisions of one call that are learned together, all with the same window.
 struct Run {
-    decisions: Vec<Prepared>,
+    decisions: Vec<Views>,
 }
 
 impl Run {
@@ -107,12 +97,12 @@ fn balanced(runs: &[Run], n_frames: usize) -> usize {
 
 /// Step by step: the first decision of every run, then the second of those that have one, and so on, with the longest
 /// runs first; and how many there are of each.
-fn packed(mut runs: Vec<Run>) -> (Vec<Prepared>, Vec<usize>) {
+fn packed(mut runs: Vec<Run>) -> (Vec<Views>, Vec<usize>) {
     runs.sort_by_key(|run| std::cmp::Reverse(run.decisions.len()));
     let mut rest: Vec<_> = runs.into_iter().map(|run| run.decisions.into_iter()).collect();
     let (mut decisions, mut steps) = (Vec::new(), Vec::new());
     loop {
-        let step: Vec<Prepared> = rest.iter_mut().filter_map(Iterator::next).collect();
+        let step: Vec<Views> = rest.iter_mut().filter_map(Iterator::next).collect();
         if step.is_empty() {
             return (decisions, steps);
         }
@@ -130,12 +120,12 @@ struct Counts {
 }
 
 impl Counts {
-    fn of<'d>(drawn: impl Iterator<Item = &'d Prepared> + Clone) -> Self {
+    fn of<'d>(drawn: impl Iterator<Item = &'d Views> + Clone) -> Self {
         let scoped = drawn.clone().filter(|prepared| prepared.example.scope.is_some());
         Self {
             examples: drawn.clone().count(),
             scoped_frames: scoped.map(|prepared| prepared.example.window.len()).sum(),
-            arguments: drawn.map(|prepared| prepared.arguments.len()).sum(),
+            arguments: drawn.map(|prepared| prepared.example.arguments.len()).sum(),
         }
     }
 }
@@ -162,37 +152,38 @@ fn prepare(
     examples: &Examples<'_>,
     config: &TrainConfig,
     may_recover: bool,
-    mut example: Example,
+    example: Example,
     rng: &mut impl Rng,
-) -> Prepared {
+) -> Views {
     let data = examples.data();
     let width = Observation::width(data.n_slots);
     let family = data.trials[example.trial].family;
-    let rows = &data.trials[example.demonstration].observations;
     let mut views = Views {
         n_slots: data.n_slots,
-        window: rows[example.window.begin as usize * width..example.window.end as usize * width].to_vec(),
+        specification: examples.specification(),
+        window: examples.specification_rows(example.demonstration, example.window),
         state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
-        arguments: example.arguments.clone(),
-        given: example.given,
+        example,
     };
     // One draw, whatever the settings: see `Views::augment`.
     let mut recovery = Seed(rng.random()).rng();
     let recovers = recovery.random::<f32>() < config.recovery_states.unwrap_or_default();
     if recovers && may_recover && family == Family::BlockStacking {
-        let sub_tasks = examples.sub_tasks(example.demonstration);
-        recovery::knock_over(&sub_tasks, &mut example, &mut views.state, &mut recovery);
+        let sub_tasks = examples.sub_tasks(views.example.demonstration);
+        recovery::knock_over(&sub_tasks, &mut views.example, &mut views.state, &mut recovery);
     }
-    views.augment(family, config, &example, rng);
-    let Views { n_slots: _, window, state, arguments, given } = views;
-    Prepared { example, window, state, arguments, given }
+    views.augment(family, config, rng);
+    views
 }
 
 fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
     let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
-    let windows = Windows::new(n_slots, &slices);
+    let windows = match examples.specification() {
+        SpecificationForm::Trajectories => Windows::new(n_slots, &slices),
+        SpecificationForm::Instructions => Windows::of_instructions(n_slots, &slices),
+    };
     let weight = 1.0 / counts.examples as f32;
     let one_hot = |width: usize, hot: Option<usize>, value: f32| {
         (0..width).map(move |column| if Some(column) == hot { value } else { 0.0 })
@@ -201,10 +192,10 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         .iter()
         .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
         .collect();
-    let arguments = part.iter().any(|prepared| !prepared.arguments.is_empty()).then(|| {
+    let arguments = part.iter().any(|prepared| !prepared.example.arguments.is_empty()).then(|| {
         let value = 1.0 / counts.arguments as f32;
-        let slots = |prepared: &Prepared| {
-            let named = prepared.arguments.iter().map(|slot| Some(usize::from(slot.0)));
+        let slots = |prepared: &Views| {
+            let named = prepared.example.arguments.iter().map(|slot| Some(usize::from(slot.0)));
             named.chain(std::iter::repeat(None)).take(examples.decisions().n_arguments()).collect::<Vec<_>>()
         };
         part.iter().flat_map(slots).flat_map(|slot| one_hot(n_slots, slot, value)).collect()
@@ -222,12 +213,12 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
         weight,
         scopes,
         arguments,
-        given: part.iter().map(|prepared| prepared.given).collect(),
+        given: part.iter().map(|prepared| prepared.example.given).collect(),
     }
 }
 
 /// `[B, T, 4]`, zero where a frame has no label.
-fn scope_targets(part: &[Prepared], n_frames: usize, value: f32) -> Vec<f32> {
+fn scope_targets(part: &[Views], n_frames: usize, value: f32) -> Vec<f32> {
     let n_labels = ScopingLabel::ALL.len();
     let mut targets = vec![0.0; part.len() * n_frames * n_labels];
     for (prepared, frames) in part.iter().zip(targets.chunks_exact_mut((n_frames * n_labels).max(1))) {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Architecture, EncoderKind, Variant};
+use crate::trace::SpecificationForm;
 use crate::training::TrainError;
 
 /// What is trained, and how.
@@ -12,6 +13,8 @@ use crate::training::TrainError;
 pub struct Training {
     /// The kind of network.
     pub variant: Variant,
+    /// What it reads as task specification.
+    pub specification: SpecificationForm,
     /// What parameters, batches and augmentations are drawn from.
     pub seed: u64,
     /// How.
@@ -19,6 +22,31 @@ pub struct Training {
 }
 
 impl Training {
+    /// Whether the settings make sense together.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::Config`] for the first that does not, with what is allowed.
+    pub fn check(&self) -> Result<(), TrainError> {
+        self.config.check()?;
+        if self.specification == SpecificationForm::Trajectories {
+            return Ok(());
+        }
+        let refuse = |key, found, allowed| Err(TrainError::Config { key, found, allowed });
+        if self.variant != Variant::Ntp {
+            let found = format!("{} with variant {}", self.specification, self.variant);
+            return refuse("specification", found, "instructions with variant ntp alone");
+        }
+        let shares = [
+            ("relabel_slots", self.config.relabel_slots.unwrap_or(0.0)),
+            ("merge_containers", self.config.merge_containers),
+        ];
+        match shares.into_iter().find(|(_, share)| *share > 0.0) {
+            Some((key, share)) => refuse(key, share.to_string(), "0 with instructions, whose words name slots"),
+            None => Ok(()),
+        }
+    }
+
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
@@ -75,6 +103,9 @@ pub struct TrainConfig {
     /// How often part of what was built lies on the table again, and the root program is to build it anew (0 to 1);
     /// for families that build towers. By default 0.25 for object-centric networks and never for flattened ones.
     pub recovery_states: Option<f32>,
+    /// How often whatever goes into one container goes into another (0 to 1), so that several categories share one as
+    /// in mappings that no training task shows. Off by default; for Object Sorting.
+    pub merge_containers: f32,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -97,6 +128,7 @@ impl Default for TrainConfig {
             gripper_jitter: None,
             scatter_bystanders: 0.0,
             recovery_states: None,
+            merge_containers: 0.0,
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -166,6 +198,7 @@ impl TrainConfig {
             ("gripper_jitter", self.gripper_jitter.unwrap_or(0.0)),
             ("scatter_bystanders", self.scatter_bystanders),
             ("recovery_states", self.recovery_states.unwrap_or(0.0)),
+            ("merge_containers", self.merge_containers),
         ];
         let weights = [
             ("loss.program", loss.program),

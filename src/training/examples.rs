@@ -20,7 +20,7 @@ use crate::model::{Decisions, Given};
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::task::Split;
-use crate::trace::{Observation, ProgramCall, Span};
+use crate::trace::{Observation, ProgramCall, Span, SpecificationForm, instruction_spans};
 use crate::training::recovery::{SubTask, position};
 use crate::training::{Pairing, TrainError};
 
@@ -66,6 +66,9 @@ pub enum Grain {
 #[derive(Debug)]
 pub struct Examples<'d> {
     data: &'d DatasetTrials,
+    specification: SpecificationForm,
+    /// For each trial and call, the callee's part of the trial's specification.
+    parts: Vec<Vec<Option<Span>>>,
     decisions: Decisions,
     grain: Grain,
     trees: Vec<CallTree>,
@@ -102,7 +105,7 @@ impl<'d> Examples<'d> {
     ///
     /// As [`Self::of`].
     pub fn new(data: &'d DatasetTrials) -> Result<Self, TrainError> {
-        Self::of(data, Decisions::Scoped, Grain::Decision)
+        Self::of(data, SpecificationForm::Trajectories, Decisions::Scoped, Grain::Decision)
     }
 
     /// Indexes a dataset for what a model decides.
@@ -110,11 +113,17 @@ impl<'d> Examples<'d> {
     /// # Errors
     ///
     /// [`TrainError::NoTrials`] without a training trial; [`TrainError::Trial`] when one does not fit together.
-    pub fn of(data: &'d DatasetTrials, decisions: Decisions, grain: Grain) -> Result<Self, TrainError> {
+    pub fn of(
+        data: &'d DatasetTrials,
+        specification: SpecificationForm,
+        decisions: Decisions,
+        grain: Grain,
+    ) -> Result<Self, TrainError> {
         let mut by_task: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-        let mut trees = Vec::new();
+        let (mut trees, mut parts) = (Vec::new(), Vec::new());
         for (position, trial) in data.trials.iter().enumerate() {
             trees.push(CallTree::new(trial, data.n_slots, decisions)?);
+            parts.push(parts_of(trial, specification)?);
             if trial.split == Split::Seen {
                 by_task.entry(&trial.task_id).or_default().push(position);
             }
@@ -140,7 +149,8 @@ impl<'d> Examples<'d> {
                 }
             }
         }
-        Ok(Self { data, decisions, grain, trees, tasks, task_of_trial, levels: levels.into_values().collect() })
+        let levels = levels.into_values().collect();
+        Ok(Self { data, specification, parts, decisions, grain, trees, tasks, task_of_trial, levels })
     }
 
     /// The programs that decide, in the order of the program memory, and whether each is a root.
@@ -156,6 +166,26 @@ impl<'d> Examples<'d> {
     /// What is learned.
     pub fn decisions(&self) -> Decisions {
         self.decisions
+    }
+
+    /// The form of the specifications.
+    pub fn specification(&self) -> SpecificationForm {
+        self.specification
+    }
+
+    /// The rows of a trial's specification within a span: observations, or words as numbers.
+    pub fn specification_rows(&self, trial: usize, span: Span) -> Vec<f32> {
+        let TrialData { observations, instructions, .. } = &self.data.trials[trial];
+        let rows = span.begin as usize..span.end as usize;
+        match self.specification {
+            SpecificationForm::Trajectories => {
+                let width = Observation::width(self.data.n_slots);
+                observations[rows.start * width..rows.end * width].to_vec()
+            }
+            SpecificationForm::Instructions => {
+                instructions[rows].iter().flat_map(|instruction| instruction.words).map(f32::from).collect()
+            }
+        }
     }
 
     /// The dataset behind.
@@ -194,13 +224,13 @@ impl<'d> Examples<'d> {
             Decisions::Primitives => 0,
             Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => decided.caller?.0 as usize,
         };
-        let demonstrated = &self.data.trials[demonstration].calls;
+        let parts = &self.parts[demonstration];
         let window = match self.decisions {
-            Decisions::Scoped => demonstrated[self.matching(trial, own_caller, demonstration)?].output?,
-            Decisions::Unscoped | Decisions::Primitives | Decisions::Arguments => demonstrated[0].output?,
+            Decisions::Scoped => parts[self.matching(trial, own_caller, demonstration)?]?,
+            Decisions::Unscoped | Decisions::Primitives | Decisions::Arguments => parts[0]?,
         };
         let scope = if self.decisions.has_scopes() && decided.program.is_composite() {
-            let part = demonstrated[self.matching(trial, call, demonstration)?].output?;
+            let part = parts[self.matching(trial, call, demonstration)?]?;
             Some(Span { begin: part.begin - window.begin, end: part.end - window.begin })
         } else {
             None
@@ -230,8 +260,9 @@ impl<'d> Examples<'d> {
         let TrialData { calls, observations, .. } = &self.data.trials[trial];
         let width = Observation::width(self.data.n_slots);
         let sub_task = |(&call, moves): (&usize, &Vec<SlotIndex>)| {
-            let (&[source, target], Some(part)) = (moves.as_slice(), calls[call].output) else { return None };
-            let last = &observations[part.last() as usize * width..][..width];
+            let (&[source, target], Some(shown)) = (moves.as_slice(), calls[call].output) else { return None };
+            let part = self.parts[trial][call]?;
+            let last = &observations[shown.last() as usize * width..][..width];
             let (upper, lower) = (position(last, source), position(last, target));
             let offset_m = std::array::from_fn(|axis| upper[axis] - lower[axis]);
             Some(SubTask { program: calls[call].program, source, target, part, offset_m })
@@ -269,6 +300,22 @@ impl<'d> Examples<'d> {
         let caller = self.matching(trial, caller.0 as usize, other)?;
         let found = *tree.callees[caller].get(usize::from(calls[call].step))?;
         (candidates[found].program == program).then_some(found)
+    }
+}
+
+/// Each call's part of a trial's specification. Every decision is made on one, so a trial without any is refused.
+fn parts_of(trial: &TrialData, specification: SpecificationForm) -> Result<Vec<Option<Span>>, TrainError> {
+    let parts: Vec<Option<Span>> = match specification {
+        SpecificationForm::Trajectories => trial.calls.iter().map(|call| call.output).collect(),
+        SpecificationForm::Instructions => instruction_spans(&trial.calls, &trial.instructions),
+    };
+    match parts.first() {
+        Some(Some(_)) => Ok(parts),
+        _ => Err(TrainError::Trial {
+            task: trial.task_id.clone(),
+            trial: trial.trial,
+            problem: format!("it has no {specification} to be specified by"),
+        }),
     }
 }
 

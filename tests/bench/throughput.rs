@@ -17,7 +17,7 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
-use ntp::trace::{Actor, Episode, Provenance};
+use ntp::trace::{Actor, Episode, Provenance, SpecificationForm};
 use ntp::training::{Hooks, TrainConfig, Training, train};
 
 /// Runs the convert stage alone, in a process of its own, and prints its peak memory.
@@ -159,7 +159,7 @@ impl Bench {
     /// Decisions learned from in training, batch building included.
     fn train_samples(&self, trials: &DatasetTrials) {
         let config = TrainConfig { steps: Some(60), checkpoint_every: 1000, ..TrainConfig::default() };
-        let training = Training { variant: Variant::Ntp, seed: 0, config };
+        let training = Training { variant: Variant::Ntp, specification: SpecificationForm::default(), seed: 0, config };
         let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
         let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join("model"), &mut hooks));
         let summary = summary.expect("training goes well");

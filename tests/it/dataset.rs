@@ -12,7 +12,9 @@ use ntp::program::Program;
 use ntp::rollout::{Limits, Oracle, Start, run};
 use ntp::table::{self, Column, TableSchema};
 use ntp::task::{Split, Task};
-use ntp::trace::{Actor, Cause, Episode, EpisodeParts, Frame, Outcome, ProgramCall, Provenance, ScopingLabel, Span};
+use ntp::trace::{
+    Actor, Cause, Episode, EpisodeParts, Frame, Outcome, ProgramCall, Provenance, ScopingLabel, Span, instructions,
+};
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
 
@@ -106,6 +108,7 @@ fn expected_trial(episode: &Episode) -> TrialData {
         n_frames: boundaries.len(),
         observations: episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect(),
         calls: episode.calls.iter().map(call).collect(),
+        instructions: instructions(&episode.calls, &episode.scene.slots),
     }
 }
 
@@ -607,6 +610,7 @@ fn every_wrong_value_has_a_finding_of_its_own_code() {
     let calls = |column, row| spoil(FIRST_CALLS, schema::CALLS, column, row);
     finding(calls("depth", 3), "calls.tree", FIRST_CALLS, "its depth is");
     finding(calls("argument", 3), "calls.argument", FIRST_CALLS, "other");
+    finding(calls("instruction", 3), "calls.instruction", FIRST_CALLS, "other");
     finding(calls("program", 3), "calls.row", FIRST_CALLS, "unknown program");
     let scopes = |column, row| spoil(FIRST_SCOPES, schema::SCOPES, column, row);
     finding(scopes("label", 3), "scopes.label", FIRST_SCOPES, "but the span makes them");
@@ -615,6 +619,17 @@ fn every_wrong_value_has_a_finding_of_its_own_code() {
     finding(episodes("split", 3), "episodes.value", "ntp/episodes.parquet", "unknown split");
     finding(episodes("success", 3), "episodes.value", "ntp/episodes.parquet", "do not go together");
     finding(episodes("n_scopes", 5), "scopes.row", FIRST_SCOPES, "n_scopes");
+}
+
+#[test]
+fn an_unknown_word_of_an_instruction_is_named_with_file_and_row_and_what_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+    spoil(FIRST_CALLS, schema::CALLS, "instruction", 3)(folder.path());
+    let error = read_trials(folder.path()).unwrap_err().to_string();
+    for part in [FIRST_CALLS, "unknown word \"other\"", "row 3", "block_A", "pick", "into"] {
+        assert!(error.contains(part), "{error} does not name {part}");
+    }
 }
 
 #[test]

@@ -3,16 +3,17 @@
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Given, Gru, LabelScores, Lstm, ModelConfig,
-    ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig, ProgramMemory, ScopeHead,
-    Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
+    CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Given, Gru, Instructed, InstructedConfig,
+    LabelScores, Lstm, ModelConfig, ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig,
+    ProgramMemory, ScopeHead, Sentences, Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score,
+    weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
 use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::task::{Family, Split};
-use ntp::trace::{Observation, Span};
+use ntp::trace::{Observation, Span, SpecificationForm};
 use proptest::prelude::{ProptestConfig, prop, prop_assert, proptest};
 use rand::Rng as _;
 
@@ -111,8 +112,8 @@ fn parameter_counts_are_what_they_were() {
             ("flat_paper", 229_289),
             ("flat_gru", 26_506),
             ("flat_gru_paper", 285_161),
-            ("npi", 26_455),
-            ("npi_paper", 129_713),
+            ("npi", 26_487),
+            ("npi_paper", 129_777),
         ]
     );
 }
@@ -288,6 +289,62 @@ fn the_lstm_computes_what_it_says() {
     assert_near(&[values(hidden), values(memory)].concat(), &[0.259_619, 2.018_887]);
 }
 
+/// Sentences of three words of a vocabulary for 3 slots, as numbers.
+fn sentences(n: usize) -> Vec<f32> {
+    (0..n).flat_map(|sentence| [2.0, 3.0, 6.0 + (sentence % 3) as f32]).collect()
+}
+
+fn instructed() -> Ntp<Instructed> {
+    Ntp::new(&InstructedConfig::default(), 3, Seed(5), &device())
+}
+
+/// Programs, ends and arguments, and the labels of the first two sentences.
+fn follow(demonstration: &Sentences, states: &[f32]) -> Said {
+    let network = instructed();
+    let reading = network.read(demonstration, states, &[Given::default()]);
+    let (core, _) = network.core(&reading, Program::Pick, &[1], None);
+    let scopes = network.scope(&reading, Program::Pick, &core).map(values).unwrap_or_default();
+    Said {
+        programs: values(core.programs.clone()),
+        ends: values(core.end.clone()),
+        scopes: scopes[..8].to_vec(),
+        arguments: values(network.argument(&reading, Program::Pick, &core)),
+    }
+}
+
+#[test]
+fn a_cut_of_instructions_reads_as_its_part_alone() {
+    let (network, state) = (instructed(), rows(1, 3, 7));
+    let all = sentences(5);
+    let whole = network.demonstration(&Windows::of_instructions(3, &[&all]));
+    let cut = <Ntp<Instructed> as Network>::window(&whole, Span { begin: 1, end: 3 });
+    let alone = network.demonstration(&Windows::of_instructions(3, &[&all[3..9]]));
+    let (cut, alone) = (follow(&cut, &state), follow(&alone, &state));
+    assert_near(&cut.programs, &alone.programs);
+    assert_near(&cut.scopes, &alone.scopes);
+    assert_near(&cut.arguments, &alone.arguments);
+}
+
+#[test]
+fn padding_of_instructions_changes_nothing_within_a_window() {
+    let (network, states) = (instructed(), rows(2, 3, 7));
+    let (short, long) = (sentences(2), sentences(6));
+    let padded = network.demonstration(&Windows::of_instructions(3, &[&short, &long]));
+    let reading = network.read(&padded, &states, &[Given::default(); 2]);
+    let (core, _) = network.core(&reading, Program::Pick, &[2], None);
+    let scopes = network.scope(&reading, Program::Pick, &core).map(values).unwrap();
+    let alone = follow(&network.demonstration(&Windows::of_instructions(3, &[&short])), &states[..11]);
+    assert_near(&values(core.end.clone())[..1], &alone.ends);
+    assert_near(&scopes[..8], &alone.scopes);
+    assert_near(&values(network.argument(&reading, Program::Pick, &core))[..3], &alone.arguments);
+}
+
+#[test]
+fn the_encoder_of_instructions_has_as_many_parameters_as_it_had() {
+    let config = InstructedConfig::default();
+    assert_eq!(Parameters.run(Ntp::<Instructed>::new(&config, 8, Seed(0), &device())), 0);
+}
+
 #[test]
 fn a_cut_demonstration_reads_as_its_part_alone() {
     let (network, all) = (object_centric(1), rows(9, 8, 4));
@@ -393,7 +450,7 @@ fn store(folder: &std::path::Path, config: &ModelConfig, weights: &[u8]) {
 }
 
 fn config(variant: Variant) -> ModelConfig {
-    ModelConfig::new(variant, Family::BlockStacking, 8, serde_json::Value::Null)
+    ModelConfig::new(variant, SpecificationForm::default(), Family::BlockStacking, 8, serde_json::Value::Null)
 }
 
 #[test]

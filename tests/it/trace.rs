@@ -3,7 +3,10 @@
 use ntp::program::Program;
 use ntp::scene::{BodyIndex, SlotIndex};
 use ntp::task::Split;
-use ntp::trace::{CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Span, TraceError};
+use ntp::trace::{
+    CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Span, TraceError, Vocabulary, instruction_spans,
+    instructions, sentence,
+};
 use proptest::prelude::*;
 
 use crate::kinematic::{demonstration, sorting, tower, trial};
@@ -163,4 +166,45 @@ fn with_frames_between(episode: Episode, every: usize) -> Episode {
     parts.frames = parts.frames.drain(..).enumerate().flat_map(between).collect();
     parts.specification_frames = parts.frames.len() as u32;
     Episode::new(parts).unwrap()
+}
+
+#[test]
+fn instructions_are_a_sentence_for_each_call_that_calls_primitives() {
+    let parts = parts();
+    let name = |slot: usize| parts.scene.slots[slot].name.as_str();
+    let sentences: Vec<String> =
+        (0..parts.calls.len()).filter_map(|position| sentence(&parts.calls, position, name)).collect();
+    assert_eq!(sentences, ["pick block_F", "place on block_C", "pick block_A", "place on block_F"]);
+    let task = sorting("s", [1, 0, 3, 2], Split::Seen);
+    let sorted = demonstration(&task, &trial(&task, 0, 1), 0);
+    let name = |slot: usize| sorted.scene.slots[slot].name.as_str();
+    assert_eq!(sentence(&sorted.calls, 5, name).as_deref(), Some("drop into bin_2"));
+}
+
+#[test]
+fn a_call_spans_the_instructions_of_what_it_calls() {
+    let parts = parts();
+    let instructions = instructions(&parts.calls, &parts.scene.slots);
+    let spans = instruction_spans(&parts.calls, &instructions);
+    let of = |program: Program| -> Vec<(u32, u32)> {
+        let calls = parts.calls.iter().zip(&spans).filter(|(call, _)| call.program == program);
+        calls.filter_map(|(_, span)| span.map(|span| (span.begin, span.end))).collect()
+    };
+    assert_eq!(of(Program::BlockStacking), [(0, 4)]);
+    assert_eq!(of(Program::PickAndPlace), [(0, 2), (2, 4)]);
+    assert_eq!(of(Program::Pick), [(0, 1), (2, 3)]);
+    assert_eq!(of(Program::Place), [(1, 2), (3, 4)]);
+    assert_eq!(of(Program::MoveTo), [], "what lies below an instruction has none of its own");
+}
+
+#[test]
+fn words_outside_the_vocabulary_are_named() {
+    let vocabulary = Vocabulary::new(["block_A", "block_B"]);
+    assert_eq!(vocabulary.words("place on block_B"), Ok([2, 3, 7]));
+    assert_eq!(Vocabulary::size(2), 8);
+    let refused = |sentence: &str| vocabulary.words(sentence).unwrap_err().to_string();
+    assert!(refused("pick block_Z").starts_with("unknown word \"block_Z\" in the instruction \"pick block_Z\""));
+    assert!(refused("pick block_Z").contains("block_A, block_B"));
+    assert!(refused("  ").starts_with("no word"));
+    assert!(refused("place on on block_A").starts_with("too many words"));
 }

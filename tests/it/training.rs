@@ -11,7 +11,7 @@ use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
-use ntp::trace::{Actor, Episode, Provenance, Span};
+use ntp::trace::{Actor, Episode, Provenance, Span, SpecificationForm, Vocabulary, instructions};
 use ntp::training::{
     Curriculum, Example, Examples, Grain, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
     Training, draw, train,
@@ -29,6 +29,7 @@ fn trial_data(episode: &Episode) -> TrialData {
         n_frames: episode.frames.len(),
         observations: frames.flatten().collect(),
         calls: episode.calls.clone(),
+        instructions: instructions(&episode.calls, &episode.scene.slots),
     }
 }
 
@@ -44,7 +45,7 @@ fn towers() -> DatasetTrials {
 }
 
 fn ntp(config: TrainConfig) -> Training {
-    Training { variant: Variant::Ntp, seed: 0, config }
+    Training { variant: Variant::Ntp, specification: SpecificationForm::default(), seed: 0, config }
 }
 
 fn resolved(config: TrainConfig) -> TrainConfig {
@@ -92,7 +93,7 @@ fn labels_of_stacking_are_the_demonstrations_spans() {
 #[test]
 fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
     let data = towers();
-    let examples = Examples::of(&data, Decisions::Primitives, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Primitives, Grain::Call).unwrap();
     assert_eq!(examples.levels().collect::<Vec<_>>(), [(Program::BlockStacking, true)]);
     let mut rng = Seed(1).rng();
     let mut run = examples.draw(0, Pairing::Cross, &mut rng);
@@ -120,7 +121,7 @@ fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
 #[test]
 fn without_scopes_every_program_learns_from_the_whole_demonstration() {
     let data = towers();
-    let examples = Examples::of(&data, Decisions::Unscoped, Grain::Decision).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Unscoped, Grain::Decision).unwrap();
     assert_eq!(examples.levels().count(), 4);
     let mut rng = Seed(1).rng();
     for level in 0..4 {
@@ -134,7 +135,7 @@ fn without_scopes_every_program_learns_from_the_whole_demonstration() {
 #[test]
 fn npi_learns_what_programs_are_called_with() {
     let data = towers();
-    let examples = Examples::of(&data, Decisions::Arguments, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Arguments, Grain::Call).unwrap();
     assert_eq!(examples.task_ids(), ["a", "b"]);
     let of = |program: Program| -> Example {
         let trial = data.trials.iter().position(|trial| trial.task_id == "b").unwrap();
@@ -155,7 +156,7 @@ fn npi_learns_what_programs_are_called_with() {
 #[test]
 fn the_steps_of_a_call_are_packed_step_by_step() {
     let data = towers();
-    let examples = Examples::of(&data, Decisions::Scoped, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Scoped, Grain::Call).unwrap();
     let config = resolved(TrainConfig { relabel_slots: Some(1.0), ..TrainConfig::default() });
     for level in 0..4 {
         for part in draw(&examples, &config, level, 24, Seed(2)) {
@@ -382,6 +383,50 @@ fn success_rate(folder: &Path, tasks: &[Task]) -> f32 {
 
 fn last(metrics: &[Metric], level: Program) -> Metric {
     metrics.iter().rfind(|metric| metric.level == level).unwrap().clone()
+}
+
+#[test]
+fn a_short_training_follows_instructions_for_unseen_towers() {
+    let set = sample(Family::BlockStacking, 30, 20, Seed(3)).unwrap();
+    let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig { steps: Some(500), gripper_jitter: Some(0.0), ..TrainConfig::default() };
+    let training = Training { specification: SpecificationForm::Instructions, ..ntp(config) };
+    train_until(&training, &demonstrations(&seen, 10), folder.path(), None).unwrap();
+    let rate = success_rate(folder.path(), &unseen);
+    assert!(rate >= 0.8, "{rate}");
+}
+
+#[test]
+fn instructions_are_for_variant_ntp_without_other_names_for_slots() {
+    let refused = |variant, config| {
+        let training = Training { variant, specification: SpecificationForm::Instructions, seed: 0, config };
+        training.check().unwrap_err().to_string()
+    };
+    let error = refused(Variant::Flat, TrainConfig::default());
+    assert_eq!(error, "specification is instructions with variant flat; allowed: instructions with variant ntp alone");
+    let relabelled = TrainConfig { relabel_slots: Some(0.5), ..TrainConfig::default() };
+    assert_eq!(
+        refused(Variant::Ntp, relabelled),
+        "relabel_slots is 0.5; allowed: 0 with instructions, whose words name slots"
+    );
+}
+
+#[test]
+fn an_example_of_instructions_has_the_sentences_of_its_sub_task() {
+    let data = towers();
+    let form = SpecificationForm::Instructions;
+    let examples = Examples::of(&data, form, Decisions::Scoped, Grain::Decision).unwrap();
+    let call = decisions(&data, 0, Program::BlockStacking)[1];
+    let example = examples.example(0, call, 1).unwrap();
+    assert_eq!((example.window, example.scope), (span(0, 4), Some(span(2, 4))));
+    let vocabulary = Vocabulary::new(["A", "B", "C", "D", "E", "F", "G", "H"]);
+    let said: Vec<f32> = ["pick C", "place on B"]
+        .into_iter()
+        .flat_map(|sentence| vocabulary.words(sentence).unwrap())
+        .map(f32::from)
+        .collect();
+    assert_eq!(examples.specification_rows(1, span(2, 4)), said);
 }
 
 #[test]

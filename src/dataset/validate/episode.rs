@@ -10,7 +10,7 @@ use crate::dataset::finding::Validation;
 use crate::dataset::layout::FilePlace;
 use crate::table::{Columns, TableError};
 use crate::task::{Family, Split};
-use crate::trace::{Cause, ProgramCall};
+use crate::trace::{Cause, ProgramCall, sentence};
 
 /// What the episodes so far said of their tasks.
 #[derive(Default)]
@@ -90,34 +90,41 @@ fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
     problems
 }
 
-/// The names of arguments in `ntp/calls/`.
+/// Names and sentences in `ntp/calls/`.
 pub(super) struct ArgumentBatch {
     argument: Vec<Option<String>>,
+    instruction: Vec<Option<String>>,
 }
 
 impl Batch for ArgumentBatch {
-    const COLUMNS: &'static [&'static str] = &["argument"];
+    const COLUMNS: &'static [&'static str] = &["argument", "instruction"];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { argument: columns.optional_text("argument")? })
+        Ok(Self { argument: columns.optional_text("argument")?, instruction: columns.optional_text("instruction")? })
     }
 }
 
-/// Holds the names against the episode's slots.
+/// Holds the names against the episode's slots, and the sentences against the calls.
 pub(super) fn check_arguments(
     cursor: &mut Cursor<ArgumentBatch>,
     row: &EpisodeRow,
     calls: &[ProgramCall],
     validation: &mut Validation,
 ) -> Result<(), DatasetError> {
-    for call in calls {
+    for (position, call) in calls.iter().enumerate() {
         let (batch, at) = cursor.next(row.calls)?;
+        let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
+        let name = |slot: usize| row.slots.get(slot).map_or("", String::as_str);
+        let (found, said) = (batch.argument[at].clone(), batch.instruction[at].clone());
+        let meant = sentence(calls, position, name);
+        if said != meant {
+            let message = format!("instruction is {said:?}, but the call is {meant:?}");
+            validation.error("calls.instruction", &cursor.path(), place(), message);
+        }
         let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0)));
-        let found = batch.argument[at].as_ref();
-        if found != expected {
+        if found.as_ref() != expected {
             let message = format!("argument is {found:?}, but its slot is named {expected:?}");
-            let place = format!("episode {}, call {}", row.episode_index, call.id.0);
-            validation.error("calls.argument", &cursor.path(), place, message);
+            validation.error("calls.argument", &cursor.path(), place(), message);
         }
     }
     Ok(())
