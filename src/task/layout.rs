@@ -105,7 +105,7 @@ fn stacking_scene() -> Scene {
     Scene {
         bodies: names.iter().zip(&BLOCK_COLORS).map(body).collect(),
         slots: names.into_iter().enumerate().map(|(index, name)| single_slot(index, name)).collect(),
-        table_half_m: [0.4, 0.4],
+        table_half_m: [0.6, 0.6],
     }
 }
 
