@@ -26,7 +26,7 @@ impl Answer {
 
     /// Aligned columns under their names, then how many rows there are.
     pub fn to_text(&self) -> String {
-        let columns: Vec<Vec<String>> = self.0.columns().iter().map(|column| cells(column)).collect();
+        let columns: Vec<Vec<String>> = self.0.columns().iter().map(cells).collect();
         let widths: Vec<usize> =
             columns.iter().map(|cells| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0)).collect();
         let line = |row: usize| {

@@ -233,11 +233,12 @@ impl<N: Network> Policy for LearnedPolicy<N> {
         let running: Vec<_> = queries.iter().map(|query| self.running(query)).collect();
         let decided: Vec<_> =
             queries.par_iter().zip(running).map(|(query, running)| self.decide_one(query, running)).collect();
-        let remember = |(query, (decision, running)): (&Query, (Decision, [Running<N::Recall>; 2]))| {
+        let mut decisions = Vec::with_capacity(queries.len());
+        for (query, (decision, running)) in queries.iter().zip(decided) {
             self.stacks.entry(query.episode).or_default().extend(running);
-            decision
-        };
-        queries.iter().zip(decided).map(remember).collect()
+            decisions.push(decision);
+        }
+        decisions
     }
 }
 
