@@ -33,6 +33,7 @@ mod object_centric;
 mod programmer;
 mod scoping;
 mod store;
+mod summary;
 mod variant;
 mod windows;
 

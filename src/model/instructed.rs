@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
-use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, with_most_before};
+use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::{Span, Vocabulary};
 
@@ -155,24 +156,12 @@ impl Encoder for Instructed {
 
     fn read(&self, sentences: &Sentences, states: &[f32]) -> InstructedReading {
         let padding = sentences.padding.as_ref();
-        let [n_batch, _, n_slots] = sentences.referents.dims();
-        let states = Rows { n_slots, values: states };
+        let states = Rows { n_slots: sentences.referents.dims()[2], values: states };
         let places = self.place.forward(self.places(sentences, states));
         let frames = relu(self.sentence.forward(relu(sentences.words.clone() + places)));
-        let frames = Padding::mask(padding, frames);
-        let last = Padding::last_frame(padding, frames.clone());
-        let frames = Padding::mask(padding, self.scope_conv.forward(frames));
-        let most = max_over_frames(frames.clone());
-        let device = self.device();
-        let now = TensorData::new(states.objects(), [n_batch, n_slots, OBJECT_WIDTH]);
-        let agents = TensorData::new(states.agents(), [n_batch, AGENT_WIDTH]);
-        let state = self.state.forward(Tensor::<3>::from_data(now, &device)).max_dim(1).squeeze_dim(1);
-        InstructedReading {
-            sentences: sentences.clone(),
-            frames,
-            context: Tensor::cat(vec![most, last], 1),
-            state: Tensor::cat(vec![state, Tensor::from_data(agents, &device)], 1),
-        }
+        let (frames, context) = summarize(&self.scope_conv, frames, padding);
+        let state = state_with_gripper(&self.state, states, &self.scope_conv);
+        InstructedReading { sentences: sentences.clone(), frames, context, state }
     }
 
     fn context(reading: &InstructedReading) -> Tensor<2> {

@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
-use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames, with_most_before};
+use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
@@ -164,22 +165,14 @@ impl Encoder for ObjectCentric {
 
     fn read(&self, demonstration: &ObjectDemonstration, states: &[f32]) -> ObjectReading {
         let padding = demonstration.padding.as_ref();
-        let [n_batch, _, n_slots, _] = demonstration.objects.dims();
-        let states = Rows { n_slots, values: states };
+        let states = Rows { n_slots: demonstration.objects.dims()[2], values: states };
         let objects = self.compare(demonstration, states);
-        let frames = Padding::mask(padding, objects.clone().max_dim(2).squeeze_dim(2)); // [B, T, H]
-        let last = Padding::last_frame(padding, frames.clone());
-        let frames = Padding::mask(padding, self.scope_conv.forward(frames));
-        let most = max_over_frames(frames.clone());
-        let device = self.device();
-        let now = TensorData::new(states.objects(), [n_batch, n_slots, OBJECT_WIDTH]);
-        let agents = TensorData::new(states.agents(), [n_batch, AGENT_WIDTH]);
-        let state = self.state.forward(Tensor::<3>::from_data(now, &device)).max_dim(1).squeeze_dim(1);
+        let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
         ObjectReading {
             objects,
             frames,
-            context: Tensor::cat(vec![most, last], 1),
-            state: Tensor::cat(vec![state, Tensor::from_data(agents, &device)], 1),
+            context,
+            state: state_with_gripper(&self.state, states, &self.scope_conv),
             padding: demonstration.padding.clone(),
         }
     }
