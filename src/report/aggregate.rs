@@ -22,8 +22,10 @@ fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
     for (cause, count) in seeds.iter().flat_map(|seed| &seed.causes) {
         *causes.entry(cause.clone()).or_default() += count;
     }
-    let paper_success_rate =
-        paper.iter().find(|value| value.is_for(&actor.variant, &suite)).map(|value| value.success_rate);
+    let paper_success_rate = paper
+        .iter()
+        .find(|value| actor.is_demonstrated() && value.is_for(&actor.variant, &suite))
+        .map(|value| value.success_rate);
     Aggregate {
         actor,
         suite,

@@ -157,7 +157,8 @@ impl<'a> Ours<'a> {
     /// A variant's rows in a suite, by the decoder that stands for it, the most training tasks first.
     fn rows(&self, variant: &str, suite: &str) -> Vec<&'a Aggregate> {
         let name = format!("{variant}{}", self.suffix);
-        let own = self.aggregates.iter().filter(|row| row.actor.variant == name && row.suite == suite);
+        let is_own = |row: &&Aggregate| row.actor.variant == name && row.actor.is_demonstrated() && row.suite == suite;
+        let own = self.aggregates.iter().filter(is_own);
         let mut own: Vec<&Aggregate> = own.collect();
         own.sort_by_cached_key(|row| order::actor(&row.actor));
         own.dedup_by_key(|row| row.actor.train_tasks);

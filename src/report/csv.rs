@@ -46,6 +46,7 @@ pub(super) fn curves(curves: &[Curve]) -> Result<Vec<u8>, ReportError> {
         "experiment" => points().map(|(curve, _)| curve.model.experiment.as_str()).collect::<Vec<_>>(),
         "variant" => points().map(|(curve, _)| curve.model.variant.as_str()).collect::<Vec<_>>(),
         "train_tasks" => points().map(|(curve, _)| curve.model.train_tasks).collect::<Vec<_>>(),
+        "specification" => points().map(|(curve, _)| curve.model.specification.as_str()).collect::<Vec<_>>(),
         "seed" => points().map(|(curve, _)| curve.model.seed).collect::<Vec<_>>(),
         "level" => points().map(|(curve, _)| curve.level.as_str()).collect::<Vec<_>>(),
         "step" => points().map(|(_, point)| point.step).collect::<Vec<_>>(),

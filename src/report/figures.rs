@@ -185,7 +185,11 @@ fn n_positions(figure: &Figure) -> usize {
 }
 
 fn figure(definition: &Definition, aggregates: &[Aggregate]) -> Figure {
-    let rows: Vec<(i64, &Aggregate)> = aggregates.iter().filter_map(|row| Some(((definition.x)(row)?, row))).collect();
+    let rows: Vec<(i64, &Aggregate)> = aggregates
+        .iter()
+        .filter(|row| row.actor.is_demonstrated())
+        .filter_map(|row| Some(((definition.x)(row)?, row)))
+        .collect();
     let mut variants = distinct(rows.iter().map(|(_, row)| &row.actor.variant));
     variants.retain(|variant| variant != "oracle");
     variants.sort_by_cached_key(|variant| order::variant(variant));
@@ -227,7 +231,8 @@ fn series(definition: &Definition, rows: &[(i64, &Aggregate)], variant: String) 
 /// Table Clean-up by bowls and forks, one grid a variant.
 pub(super) fn grids(aggregates: &[Aggregate]) -> Vec<Grid> {
     let mut cells: Vec<(String, GridCell)> = Vec::new();
-    let mut leading: Vec<&Aggregate> = aggregates.iter().filter(|row| row.actor.variant != "oracle").collect();
+    let mut leading: Vec<&Aggregate> =
+        aggregates.iter().filter(|row| row.actor.variant != "oracle" && row.actor.is_demonstrated()).collect();
     leading.sort_by_cached_key(|row| order::actor(&row.actor));
     for row in leading {
         let Some((bowls, forks)) = bowls_and_forks(&row.suite) else { continue };

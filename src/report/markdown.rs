@@ -71,7 +71,7 @@ fn row(row: &Aggregate) -> Vec<String> {
     let none = || "-".to_owned();
     vec![
         row.suite.clone(),
-        row.actor.variant.clone(),
+        row.actor.model(),
         row.actor.train_tasks.map_or_else(none, |tasks| tasks.to_string()),
         row.actor.decoder.clone().unwrap_or_else(none),
         row.seeds.to_string(),

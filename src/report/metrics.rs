@@ -60,7 +60,13 @@ pub(super) fn read(inputs: &[MetricsInput]) -> Result<Vec<Curve>, ReportError> {
     }
     curves.sort_by_cached_key(|curve| {
         let model = &curve.model;
-        (order::variant(&model.variant), model.train_tasks, model.seed, order::level(&curve.level))
+        (
+            order::variant(&model.variant),
+            model.train_tasks,
+            model.specification.clone(),
+            model.seed,
+            order::level(&curve.level),
+        )
     });
     Ok(curves)
 }
@@ -126,6 +132,7 @@ pub(super) fn ends(curves: &[Curve]) -> Vec<TrainingEnd> {
             experiment: curve.model.experiment.clone(),
             variant: curve.model.variant.clone(),
             train_tasks: curve.model.train_tasks,
+            specification: curve.model.specification.clone(),
             seed: curve.model.seed,
             level: curve.level.clone(),
             step: last.step,

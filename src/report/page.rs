@@ -203,7 +203,7 @@ pub(super) fn title_of(name: &str) -> String {
 pub(super) fn name_of(actor: &Actor) -> String {
     let tasks = actor.train_tasks.map(|tasks| format!(" {tasks}"));
     let decoder = actor.decoder.as_deref().filter(|decoder| *decoder != DECODERS[0]).map(|name| format!(" {name}"));
-    format!("{}{}{}", actor.variant, tasks.unwrap_or_default(), decoder.unwrap_or_default())
+    format!("{}{}{}", actor.model(), tasks.unwrap_or_default(), decoder.unwrap_or_default())
 }
 
 fn tasks_of(actor: &Actor) -> Option<String> {

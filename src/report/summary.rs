@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::report::PaperValue;
 use crate::report::claims::Claim;
 use crate::report::figures::{Figure, Grid};
+use crate::trace::SpecificationForm;
 
 /// Version of the file.
 pub(super) const SCHEMA_VERSION: u32 = 1;
@@ -53,6 +54,26 @@ pub struct Report {
     pub facts: Vec<Fact>,
     /// What was read.
     pub inputs: Vec<InputFile>,
+}
+
+impl Actor {
+    /// The variant, and the form of its task specification where it is not the paper's.
+    pub(super) fn model(&self) -> String {
+        model_name(&self.variant, self.specification.as_deref().unwrap_or_default())
+    }
+
+    /// Whether it is told by a demonstration what to do, as all of the paper's models are.
+    pub(super) fn is_demonstrated(&self) -> bool {
+        self.specification.as_deref() != Some(SpecificationForm::Instructions.name())
+    }
+}
+
+/// A variant's name, and the form of its task specification where it is not the paper's.
+pub(super) fn model_name(variant: &str, specification: &str) -> String {
+    match specification {
+        form if form == SpecificationForm::Instructions.name() => format!("{variant} by {form}"),
+        _ => variant.to_owned(),
+    }
 }
 
 /// Who acts: what tells models apart but for the seed of their training.
@@ -176,6 +197,8 @@ pub struct ModelSummary {
     pub variant: String,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
+    /// What it reads as task specification.
+    pub specification: String,
     /// The seed of its training.
     pub seed: i64,
     /// How many parameters it has.
@@ -206,6 +229,8 @@ pub struct TrainingEnd {
     pub variant: String,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
+    /// What it reads as task specification.
+    pub specification: String,
     /// The seed of its training.
     pub seed: i64,
     /// The program level.

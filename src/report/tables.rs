@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::chart::{color_of, distinct};
 use crate::report::figures::{Figure, Grid, Series};
-use crate::report::summary::{ModelSummary, StageCost};
+use crate::report::summary::{ModelSummary, StageCost, model_name};
 
 /// Success without an adversary and with one that pushes after a quarter of the placements.
 #[derive(Serialize)]
@@ -108,7 +108,8 @@ pub(super) struct ModelRow {
 /// One row for all seeds of a model. They stand together, as pipeline files list them.
 pub(super) fn models(models: &[ModelSummary]) -> Vec<ModelRow> {
     let same = |a: &ModelSummary, b: &ModelSummary| {
-        (&a.experiment, &a.variant, a.train_tasks) == (&b.experiment, &b.variant, b.train_tasks)
+        (&a.experiment, &a.variant, &a.specification, a.train_tasks)
+            == (&b.experiment, &b.variant, &b.specification, b.train_tasks)
     };
     models.chunk_by(same).map(model_row).collect()
 }
@@ -118,7 +119,7 @@ fn model_row(seeds: &[ModelSummary]) -> ModelRow {
     let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
     ModelRow {
         experiment: seeds[0].experiment.clone(),
-        variant: seeds[0].variant.clone(),
+        variant: model_name(&seeds[0].variant, &seeds[0].specification),
         color: color_of(&seeds[0].variant),
         tasks: thousands(seeds[0].train_tasks.max(0) as u64),
         seeds: seeds.len(),

@@ -119,6 +119,7 @@ fn model() -> ModelSummary {
         experiment: "ten".to_owned(),
         variant: "ntp".to_owned(),
         train_tasks: 100,
+        specification: "trajectories".to_owned(),
         seed: 0,
         parameters: 25_123,
         cpu_secs: Some(90.0),
@@ -199,10 +200,10 @@ fn a_training_becomes_curves() {
     let curves = run.text("curves.csv");
     let head: Vec<&str> = curves.lines().take(4).collect();
     insta::assert_snapshot!(head.join("\n"), @"
-    experiment,variant,train_tasks,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
-    ten,ntp,100,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
-    ten,ntp,100,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
-    ten,ntp,100,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
+    experiment,variant,train_tasks,specification,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
+    ten,ntp,100,trajectories,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
+    ten,ntp,100,trajectories,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
+    ten,ntp,100,trajectories,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
     ");
     assert_eq!(curves.lines().count(), 1 + 2 * 100, "300 steps are 100 points of 3 steps at each of 2 levels");
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{coordinate, nice_step, power_of_ten, thousands};
 use crate::report::chart::{PANEL, Tick, color_of, distinct, has_paper_encoder};
 use crate::report::metrics::{Curve, CurvePoint, PARTS};
+use crate::report::summary::model_name;
 
 /// No decade below this is drawn: what is smaller lies on the axis.
 const LOWEST_EXPONENT: i32 = -6;
@@ -86,7 +87,9 @@ fn panel(curves: &[&Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel
         let last = curve.points.iter().rev().find_map(|point| point.losses[part])?;
         let tip = format!(
             "{}, {} tasks, training seed {}: {last:.4} in the end",
-            model.variant, model.train_tasks, model.seed
+            model_name(&model.variant, &model.specification),
+            model.train_tasks,
+            model.seed
         );
         Some(Line { color: color_of(&model.variant), dashed: has_paper_encoder(&model.variant), path, tip })
     };
