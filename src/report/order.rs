@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use crate::program::Program;
 use crate::report::summary::{Actor, Aggregate};
 use crate::task::Family;
+use crate::trace::SpecificationForm;
 
 /// Variants from the paper's model to its ancestor; the oracle stands last.
 const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru", "npi", "oracle"];
@@ -12,15 +13,14 @@ const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru
 /// Decoders, the one that stands for its model where only one can be shown first.
 pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];
 
-/// Of the rows of one variant in a suite of an experiment the one that stands for it: the most training tasks, the
+/// Of the rows of one variant, told in one way what to do, in a suite of an experiment the one that stands for it: the most training tasks, the
 /// first decoder. Rows stand sorted by [`suite`] and [`actor`], so it is the first.
 pub(super) fn leading(aggregates: &[Aggregate]) -> Vec<Aggregate> {
     let mut leading: Vec<Aggregate> = Vec::new();
     for row in aggregates {
         let is_same = |other: &Aggregate| {
             let (own, other_actor) = (&row.actor, &other.actor);
-            other.suite == row.suite
-                && (&own.experiment, &own.variant) == (&other_actor.experiment, &other_actor.variant)
+            other.suite == row.suite && (&own.experiment, own.model()) == (&other_actor.experiment, other_actor.model())
         };
         if !leading.iter().any(is_same) {
             leading.push(row.clone());
@@ -60,7 +60,9 @@ pub(super) fn variant(name: &str) -> (usize, Vec<Word>) {
 pub(super) fn actor(actor: &Actor) -> impl Ord + use<> {
     let Actor { experiment, variant: name, train_tasks, specification, decoder } = actor.clone();
     let decoder_rank = decoder.as_ref().and_then(|name| DECODERS.iter().position(|&known| known == name));
-    (experiment, variant(&name), Reverse(train_tasks), specification, decoder_rank, decoder)
+    // What the paper's models are told by comes first.
+    let form = SpecificationForm::ALL.iter().position(|form| Some(form.name()) == specification.as_deref());
+    (experiment, variant(&name), form, Reverse(train_tasks), specification, decoder_rank, decoder)
 }
 
 /// Families in their order; within one the held-out tasks first, since they are what counts.

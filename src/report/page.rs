@@ -232,10 +232,11 @@ fn lede(report: &Report) -> Vec<String> {
     ]
 }
 
-/// The first variant's suites: it is the one the run is about.
+/// The first model's suites: it is the one the run is about.
 fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
-    let lead = aggregates.iter().map(|row| &row.actor.variant).min_by_key(|variant| order::variant(variant));
-    let own = aggregates.iter().filter(|row| Some(&row.actor.variant) == lead);
+    let rank = |row: &&Aggregate| (order::variant(&row.actor.variant), !row.actor.is_demonstrated());
+    let lead = aggregates.iter().min_by_key(rank).map(|row| row.actor.model());
+    let own = aggregates.iter().filter(|row| Some(row.actor.model()) == lead);
     let tile = |row: &Aggregate| Tile {
         suite: title_of(&row.suite),
         variant: name_of(&row.actor),
@@ -259,7 +260,7 @@ fn rows(aggregates: &[Aggregate]) -> Vec<Row> {
     let starts_suite = |at: usize| at == 0 || aggregates[at - 1].suite != aggregates[at].suite;
     let row = |(at, row): (usize, &Aggregate)| Row {
         suite: row.suite.clone(),
-        variant: row.actor.variant.clone(),
+        variant: row.actor.model(),
         tasks: tasks_of(&row.actor),
         decoder: row.actor.decoder.clone(),
         color: color_of(&row.actor.variant),
