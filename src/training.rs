@@ -16,6 +16,7 @@
 
 mod augment;
 mod batch;
+mod call_tree;
 mod checkpoint;
 mod config;
 mod curriculum;
