@@ -17,6 +17,7 @@
 //! Paper, section IV.
 
 mod build;
+mod colour_slots;
 mod config;
 mod core_network;
 mod decisions;
@@ -30,14 +31,18 @@ mod memory;
 mod network;
 mod npi;
 mod object_centric;
+mod perception;
+mod pictures;
 mod programmer;
 mod scoping;
+mod sighted;
 mod store;
 mod summary;
 mod variant;
 mod windows;
 
 pub use build::{NetworkUse, with_network};
+pub use colour_slots::{ColourSlots, ColourSlotsConfig};
 pub use config::{ModelConfig, NetworkConfig};
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
 pub use decisions::{Decisions, MAX_ARGUMENTS};
@@ -49,8 +54,11 @@ pub use memory::ProgramMemory;
 pub use network::{CoreOutput, Given, Network};
 pub use npi::{BySlot, ByVector, CallEncoder, Npi, NpiReading, SlotReading};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
+pub use perception::Perception;
+pub use pictures::{PictureSample, Pictures};
 pub use programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope, Programmer};
 pub use scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
+pub use sighted::{Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,

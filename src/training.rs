@@ -24,12 +24,14 @@ mod examples;
 mod learner;
 mod metrics;
 mod recovery;
+mod seen;
 
-pub use batch::{Part, draw};
+pub use batch::{Group, Part, draw};
 pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};
 pub use examples::{Example, Examples, Grain};
 pub use learner::{Learner, Losses, losses};
 pub use metrics::Metric;
+pub use seen::Gallery;
 
 use std::path::{Path, PathBuf};
 
@@ -161,7 +163,30 @@ pub fn train(
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
+    train_seeing(training, data, None, folder, hooks)
+}
+
+/// The same with the pictures of the trials' frames, for a variant that sees.
+///
+/// # Errors
+///
+/// As [`train`]; and when there are none for such a variant.
+pub fn train_seeing(
+    training: &Training,
+    data: &DatasetTrials,
+    gallery: Option<&dyn Gallery>,
+    folder: &Path,
+    hooks: &mut Hooks<'_>,
+) -> Result<TrainSummary, TrainError> {
     training.check()?;
+    if training.variant.sees() && gallery.is_none() {
+        let found = training.variant.to_string();
+        return Err(TrainError::Config {
+            key: "variant",
+            found,
+            allowed: "variants that see only with a dataset of pictures",
+        });
+    }
     let training = training.resolved();
     let family = family(data)?;
     let written =
@@ -172,7 +197,10 @@ pub fn train(
     }
     let device = Device::flex().autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
-    let learning = Learning { config: &training.config, data, model: &model, folder, seed, hooks };
+    if let Some((width, height)) = gallery.map(Gallery::size) {
+        model.network = model.network.seeing(width.min(height), data.n_slots);
+    }
+    let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
     with_network(&model, seed, &device, learning)
 }
 
@@ -180,6 +208,7 @@ pub fn train(
 struct Learning<'r, 'h> {
     config: &'r TrainConfig,
     data: &'r DatasetTrials,
+    gallery: Option<&'r dyn Gallery>,
     model: &'r ModelConfig,
     folder: &'r Path,
     seed: Seed,
@@ -190,10 +219,11 @@ impl NetworkUse for Learning<'_, '_> {
     type Output = Result<TrainSummary, TrainError>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        let Self { config, data, model, folder, seed, hooks } = self;
+        let Self { config, data, gallery, model, folder, seed, hooks } = self;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
         let examples = Examples::of(data, model.network.specification(), N::DECISIONS, grain)?;
-        Run { config, examples: &examples, model, folder, seed }.train(network, hooks)
+        let gallery = gallery.filter(|_| model.variant.sees());
+        Run { config, examples: &examples, gallery, model, folder, seed }.train(network, hooks)
     }
 }
 
@@ -228,6 +258,7 @@ fn dataset_hash(data: &DatasetTrials) -> String {
 struct Run<'r> {
     config: &'r TrainConfig,
     examples: &'r Examples<'r>,
+    gallery: Option<&'r dyn Gallery>,
     model: &'r ModelConfig,
     folder: &'r Path,
     seed: Seed,
@@ -237,10 +268,10 @@ impl Run<'_> {
     fn train<N: Network>(&self, network: N, hooks: &mut Hooks<'_>) -> Result<TrainSummary, TrainError> {
         let checkpoints = Checkpoints::new(self.folder, self.model, dataset_hash(self.examples.data()));
         let fresh = Learner::new(network, self.config.loss, self.config.clip_norm);
-        let Resumed { mut learner, mut standing } = checkpoints.resume(fresh)?.unwrap_or_else(|learner| {
-            let errors = LevelErrors::new(self.examples.levels().count());
-            Resumed { learner, standing: Standing { step: 0, examples: 0, errors, metrics: Vec::new() } }
-        });
+        let Resumed { mut learner, mut standing } = match checkpoints.resume(fresh)? {
+            Ok(resumed) => resumed,
+            Err(learner) => self.begin(learner)?,
+        };
         let resumed_at = standing.step;
         while standing.step < self.config.n_steps() {
             if (hooks.should_stop)() {
@@ -248,7 +279,7 @@ impl Run<'_> {
                 return Err(TrainError::Stopped { step: standing.step });
             }
             let loss;
-            (learner, loss) = self.step(learner, &mut standing);
+            (learner, loss) = self.step(learner, &mut standing)?;
             (hooks.on_progress)(Progress { step: standing.step, steps: self.config.n_steps(), loss });
             if standing.step.is_multiple_of(self.config.checkpoint_every) && standing.step < self.config.n_steps() {
                 checkpoints.save(&learner, &standing)?;
@@ -260,29 +291,33 @@ impl Run<'_> {
         Ok(TrainSummary { steps: step, examples, resumed_at, metrics })
     }
 
+    /// Before the first step.
+    fn begin<N: Network>(&self, learner: Learner<N>) -> Result<Resumed<N>, TrainError> {
+        let errors = LevelErrors::new(self.examples.levels().count());
+        let standing = Standing { step: 0, examples: 0, errors, metrics: Vec::new() };
+        let Some(gallery) = self.gallery else { return Ok(Resumed { learner, standing }) };
+        let sample = seen::sample(self.examples, gallery)?;
+        let network = learner.network().clone().acquainted(&sample, self.seed.derive("acquainted", &[]));
+        Ok(Resumed { learner: learner.with_network(network), standing })
+    }
+
     /// One step; the learner after it and the weighed loss.
-    fn step<N: Network>(&self, learner: Learner<N>, standing: &mut Standing) -> (Learner<N>, f32) {
+    fn step<N: Network>(&self, learner: Learner<N>, standing: &mut Standing) -> Result<(Learner<N>, f32), TrainError> {
         let step_seed = self.seed.derive("step", &[u64::from(standing.step)]);
         let learning_rate = self.config.learning_rate_at(standing.step);
         let chosen = standing.errors.levels(self.config.curriculum, step_seed.derive("levels", &[]));
         let levels: Vec<_> = self.examples.levels().collect();
-        let batches: Vec<Vec<Part>> = (chosen.iter().enumerate())
-            .map(|(position, &level)| {
-                let size = self.batch_size(levels[level].1);
-                draw(self.examples, self.config, level, size, step_seed.derive("batch", &[position as u64]))
-            })
-            .collect();
         let sizes: Vec<(usize, usize)> =
-            batches.iter().map(|parts| (parts.len(), parts.iter().map(|part| part.ends.len()).sum())).collect();
-        let parts: Vec<Part> = batches.into_iter().flatten().collect();
-        let (learner, losses) = learner.step(&parts, learning_rate);
+            chosen.iter().map(|&level| (level, self.batch_size(levels[level].1))).collect();
+        let groups = self.draw(&sizes, step_seed)?;
+        let (learner, losses) = learner.step(&groups, learning_rate);
         standing.step += 1;
-        let mut rest = losses.as_slice();
+        let parts: Vec<&Part> = groups.iter().flat_map(|group| &group.parts).collect();
         let mut total = 0.0;
-        for (&level, (n_parts, size)) in chosen.iter().zip(sizes) {
-            let (of_level, after) = rest.split_at(n_parts);
-            rest = after;
-            let losses = of_level.iter().copied().fold(Losses::default(), Losses::plus);
+        for (batch_idx, &level) in chosen.iter().enumerate() {
+            let of_batch = || parts.iter().zip(&losses).filter(move |(part, _)| part.batch_idx == batch_idx);
+            let losses = of_batch().map(|(_, losses)| *losses).fold(Losses::default(), Losses::plus);
+            let size: usize = of_batch().map(|(part, _)| part.ends.len()).sum();
             total += losses.total;
             standing.examples += size as u64;
             standing.errors.update(level, losses.total);
@@ -291,7 +326,19 @@ impl Run<'_> {
                 standing.metrics.push(Metric::new(standing.step, program, losses, learning_rate, size as u32));
             }
         }
-        (learner, total)
+        Ok((learner, total))
+    }
+
+    /// A step's mini-batches: of each level its size.
+    fn draw(&self, sizes: &[(usize, usize)], seed: Seed) -> Result<Vec<Group>, TrainError> {
+        if let Some(gallery) = self.gallery {
+            return seen::draw_seen(self.examples, gallery, self.config, sizes, seed.derive("seen", &[]));
+        }
+        let batches = sizes.iter().enumerate().flat_map(|(batch_idx, &(level, size))| {
+            let parts = draw(self.examples, self.config, level, size, seed.derive("batch", &[batch_idx as u64]));
+            parts.into_iter().map(move |part| Group::from(Part { batch_idx, ..part }))
+        });
+        Ok(batches.collect())
     }
 
     fn batch_size(&self, is_root: bool) -> usize {

@@ -2,6 +2,7 @@
 
 use burn::tensor::Device;
 
+use crate::model::colour_slots::ColourSlots;
 use crate::model::config::{ModelConfig, NetworkConfig};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::Flattened;
@@ -10,6 +11,7 @@ use crate::model::network::Network;
 use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
 use crate::model::object_centric::ObjectCentric;
 use crate::model::programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope};
+use crate::model::sighted::Sighted;
 use crate::model::variant::Architecture;
 use crate::seed::Seed;
 
@@ -30,6 +32,9 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
         }
         NetworkConfig::Flattened(widths) => of_encoder::<Flattened, ByVector, U>(config, widths, seed, device, wanted),
         NetworkConfig::Instructed(widths) => wanted.run(Ntp::<Instructed>::new(widths, config.n_slots, seed, device)),
+        NetworkConfig::ColourSlots(widths) => {
+            wanted.run(Ntp::<Sighted<ColourSlots>>::new(widths, config.n_slots, seed, device))
+        }
     }
 }
 

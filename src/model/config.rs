@@ -2,13 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::model::colour_slots::ColourSlotsConfig;
 use crate::model::flattened::FlattenedConfig;
 use crate::model::instructed::InstructedConfig;
 use crate::model::object_centric::ObjectCentricConfig;
+use crate::model::sighted::SightedConfig;
 use crate::model::variant::{EncoderKind, Variant};
 use crate::program::vocabulary_hash;
 use crate::task::Family;
 use crate::trace::SpecificationForm;
+
+/// Colours for letters, shadows and darker sides.
+const SPARE_COLOURS: usize = 3;
 
 /// The widths of a network, by its encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,6 +25,8 @@ pub enum NetworkConfig {
     Flattened(FlattenedConfig),
     /// Of variant `ntp` with instructions for a specification.
     Instructed(InstructedConfig),
+    /// Of [`EncoderKind::ColourSlots`].
+    ColourSlots(SightedConfig<ColourSlotsConfig>),
 }
 
 impl NetworkConfig {
@@ -29,6 +36,22 @@ impl NetworkConfig {
             (SpecificationForm::Instructions, _) => Self::Instructed(InstructedConfig::default()),
             (_, EncoderKind::ObjectCentric) => Self::ObjectCentric(ObjectCentricConfig::default()),
             (_, EncoderKind::Flattened) => Self::Flattened(FlattenedConfig::default()),
+            (_, EncoderKind::ColourSlots) => {
+                Self::ColourSlots(SightedConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }))
+            }
+        }
+    }
+
+    /// The same for pictures of a size, with a colour for each of `n_slots` objects, one for the gripper and some for
+    /// what else there is to see; widths that see nothing stay as they are.
+    #[must_use]
+    pub fn seeing(self, pixels: usize, n_slots: usize) -> Self {
+        match self {
+            Self::ColourSlots(config) => {
+                let perception = ColourSlotsConfig { pixels, colours: n_slots + 1 + SPARE_COLOURS };
+                Self::ColourSlots(SightedConfig { perception, ..config })
+            }
+            other => other,
         }
     }
 
@@ -37,6 +60,7 @@ impl NetworkConfig {
         match self {
             Self::ObjectCentric(_) | Self::Flattened(_) => SpecificationForm::Trajectories,
             Self::Instructed(_) => SpecificationForm::Instructions,
+            Self::ColourSlots(_) => SpecificationForm::Video,
         }
     }
 
@@ -46,6 +70,7 @@ impl NetworkConfig {
             Self::ObjectCentric(_) => variant.encoder() == EncoderKind::ObjectCentric,
             Self::Flattened(_) => variant.encoder() == EncoderKind::Flattened,
             Self::Instructed(_) => variant == Variant::Ntp,
+            Self::ColourSlots(_) => variant.encoder() == EncoderKind::ColourSlots,
         }
     }
 }

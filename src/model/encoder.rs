@@ -7,7 +7,9 @@ use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Device, Tensor};
 
 use crate::model::layers::Init;
+use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::windows::Windows;
+use crate::seed::Seed;
 use crate::trace::Span;
 
 /// Features that an encoder gives, and the layers that suit it.
@@ -36,6 +38,8 @@ impl Widths {
 pub trait Encoder: Module + ModuleDisplay + Sync + Sized + 'static {
     /// Its widths, as they stand in a model's configuration.
     type Config: Copy;
+    /// See [`super::Network::Percepts`].
+    type Percepts: Clone + Send + Sync;
     /// What is computed of a specification before any state is seen.
     type Demonstration: Clone + Send + Sync;
     /// Specification and state, encoded.
@@ -49,14 +53,23 @@ pub trait Encoder: Module + ModuleDisplay + Sync + Sized + 'static {
     /// What it gives.
     fn widths(config: &Self::Config) -> Widths;
 
+    /// See [`super::Network::acquainted`].
+    #[must_use]
+    fn acquainted(self, _sample: &PictureSample, _seed: Seed) -> Self {
+        self
+    }
+
+    /// See [`super::Network::perceive`].
+    fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
+
     /// See [`super::Network::demonstration`].
-    fn demonstration(&self, windows: &Windows) -> Self::Demonstration;
+    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Self::Demonstration;
 
     /// See [`super::Network::window`].
     fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
 
     /// See [`super::Network::read`].
-    fn read(&self, demonstration: &Self::Demonstration, states: &[f32]) -> Self::Reading;
+    fn read(&self, demonstration: &Self::Demonstration, states: &[f32], percepts: &Self::Percepts) -> Self::Reading;
 
     /// The specification as a whole, `[B, context]`.
     fn context(reading: &Self::Reading) -> Tensor<2>;

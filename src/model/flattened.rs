@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{Rows, flat_width};
 use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
+use crate::model::pictures::Pictures;
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
@@ -103,6 +104,7 @@ pub struct FlatReading {
 
 impl Encoder for Flattened {
     type Config = FlattenedConfig;
+    type Percepts = ();
     type Demonstration = FlatDemonstration;
     type Reading = FlatReading;
     type Argument = FlatArgument;
@@ -120,7 +122,9 @@ impl Encoder for Flattened {
         Widths { context: width, state: width, frame: width, program: program_width, core: vec![width, width] }
     }
 
-    fn demonstration(&self, windows: &Windows) -> FlatDemonstration {
+    fn perceive(&self, _pictures: &Pictures) {}
+
+    fn demonstration(&self, windows: &Windows, (): &()) -> FlatDemonstration {
         let device = self.device();
         let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots())];
         let frames = Tensor::from_data(TensorData::new(windows.rows().flat(), shape), &device);
@@ -132,7 +136,7 @@ impl Encoder for Flattened {
         FlatDemonstration { n_slots: demonstration.n_slots, frames, padding: None }
     }
 
-    fn read(&self, demonstration: &FlatDemonstration, states: &[f32]) -> FlatReading {
+    fn read(&self, demonstration: &FlatDemonstration, states: &[f32], (): &()) -> FlatReading {
         let FlatDemonstration { n_slots, frames, padding } = demonstration;
         let states = Rows { n_slots: *n_slots, values: states }.flat();
         let shape = [frames.dims()[0], flat_width(*n_slots)];

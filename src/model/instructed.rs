@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::pictures::Pictures;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::{Span, Vocabulary};
@@ -114,6 +115,7 @@ impl Instructed {
 
 impl Encoder for Instructed {
     type Config = InstructedConfig;
+    type Percepts = ();
     type Demonstration = Sentences;
     type Reading = InstructedReading;
     type Argument = Referent;
@@ -138,7 +140,9 @@ impl Encoder for Instructed {
         Widths { context, state: width + AGENT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
-    fn demonstration(&self, windows: &Windows) -> Sentences {
+    fn perceive(&self, _pictures: &Pictures) {}
+
+    fn demonstration(&self, windows: &Windows, (): &()) -> Sentences {
         let n_words = Vocabulary::size(windows.n_slots());
         let shape = [windows.n_windows(), windows.n_frames(), n_words];
         let words = Tensor::from_data(TensorData::new(windows.bags_of_words(n_words), shape), &self.device());
@@ -154,7 +158,7 @@ impl Encoder for Instructed {
         Sentences { words: cut(&sentences.words), referents: cut(&sentences.referents), padding: None }
     }
 
-    fn read(&self, sentences: &Sentences, states: &[f32]) -> InstructedReading {
+    fn read(&self, sentences: &Sentences, states: &[f32], (): &()) -> InstructedReading {
         let padding = sentences.padding.as_ref();
         let states = Rows { n_slots: sentences.referents.dims()[2], values: states };
         let places = self.place.forward(self.places(sentences, states));

@@ -35,6 +35,15 @@ impl Init {
         parameter
     }
 
+    /// Everywhere the same.
+    pub(crate) fn filled<const D: usize>(&mut self, shape: [usize; D], value: f32) -> Param<Tensor<D>> {
+        let values = vec![value; shape.iter().product()];
+        let mut parameter = Param::from_data(TensorData::new(values, shape), &self.device);
+        parameter.id = ParamId::from(self.next_id);
+        self.next_id += 1;
+        parameter
+    }
+
     /// A layer whose weights are uniform within one over the root of `n_inputs`.
     pub(crate) fn linear(&mut self, n_inputs: usize, n_outputs: usize) -> Linear {
         let bound = (n_inputs as f32).sqrt().recip();

@@ -4,9 +4,11 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use crate::model::decisions::{Decisions, MAX_ARGUMENTS};
+use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::windows::Windows;
 use crate::program::Program;
 use crate::scene::SlotIndex;
+use crate::seed::Seed;
 use crate::trace::Span;
 
 /// What a running program was called with where there is no specification to tell it; other variants do not read it.
@@ -45,6 +47,9 @@ pub trait Network: Module + Sync + 'static {
     /// Whether a decision depends on the steps before it in the same call.
     const IS_RECURRENT: bool;
 
+    /// What is made of each picture by itself, so that decisions that share pictures share the work; nothing where
+    /// observations are read.
+    type Percepts: Clone + Send + Sync;
     /// What is computed of a demonstration before any state is seen. The policy keeps it for the whole episode.
     type Demonstration: Clone + Send + Sync;
     /// Demonstration and state, encoded.
@@ -52,15 +57,31 @@ pub trait Network: Module + Sync + 'static {
     /// What a running call remembers from one step to the next.
     type Recall: Clone + Send + Sync;
 
-    /// The part that does not depend on the state: of every frame by itself, so that windows can be cut from it.
-    fn demonstration(&self, windows: &Windows) -> Self::Demonstration;
+    /// Settles what depends on what there is to see, before a first step of learning.
+    #[must_use]
+    fn acquainted(self, _sample: &PictureSample, _seed: Seed) -> Self {
+        self
+    }
+
+    /// Looks at pictures.
+    fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
+
+    /// The part that does not depend on the state: of every frame by itself, so that windows can be cut from it. With
+    /// pictures the rows of a window say which of the percepts it shows.
+    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Self::Demonstration;
 
     /// The part of a single demonstration that a program may see.
     fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
 
-    /// Encodes the demonstration and the state beside it. `states` are observation rows, one a window, and so is
-    /// `given`.
-    fn read(&self, demonstration: &Self::Demonstration, states: &[f32], given: &[Given]) -> Self::Reading;
+    /// Encodes the demonstration and the state beside it. `states` are observation rows, or say which of the percepts
+    /// is seen now: one a window, and so is `given`.
+    fn read(
+        &self,
+        demonstration: &Self::Demonstration,
+        states: &[f32],
+        percepts: &Self::Percepts,
+        given: &[Given],
+    ) -> Self::Reading;
 
     /// The next program and the end of the running one; and what the calls of the last step remember. A call's first
     /// step remembers nothing.

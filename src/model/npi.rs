@@ -23,6 +23,7 @@ use crate::model::decisions::Decisions;
 use crate::model::layers::{Init, repeat_row};
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CoreOutput, Given, Network};
+use crate::model::pictures::Pictures;
 use crate::model::windows::Windows;
 use crate::program::Program;
 use crate::seed::Seed;
@@ -112,15 +113,18 @@ impl<E: CallEncoder> Network for Npi<E> {
     const DECISIONS: Decisions = Decisions::Arguments;
     const IS_RECURRENT: bool = LstmCore::IS_RECURRENT;
 
+    type Percepts = ();
     type Demonstration = ();
     type Reading = NpiReading<E::Reading>;
     type Recall = <LstmCore as Core>::Recall;
 
-    fn demonstration(&self, _windows: &Windows) {}
+    fn perceive(&self, _pictures: &Pictures) {}
+
+    fn demonstration(&self, _windows: &Windows, (): &()) {}
 
     fn window((): &(), _span: Span) {}
 
-    fn read(&self, (): &(), states: &[f32], given: &[Given]) -> Self::Reading {
+    fn read(&self, (): &(), states: &[f32], (): &(), given: &[Given]) -> Self::Reading {
         NpiReading { calls: self.encoder.read(states, given), tasks: self.task_rows(given) }
     }
 

@@ -25,6 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::pictures::Pictures;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
@@ -119,6 +120,7 @@ impl ObjectCentric {
 
 impl Encoder for ObjectCentric {
     type Config = ObjectCentricConfig;
+    type Percepts = ();
     type Demonstration = ObjectDemonstration;
     type Reading = ObjectReading;
     type Argument = Pointer;
@@ -146,7 +148,9 @@ impl Encoder for ObjectCentric {
         Widths { context, state: width + AGENT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
-    fn demonstration(&self, windows: &Windows) -> ObjectDemonstration {
+    fn perceive(&self, _pictures: &Pictures) {}
+
+    fn demonstration(&self, windows: &Windows, (): &()) -> ObjectDemonstration {
         let device = self.device();
         let (n_batch, n_frames, n_slots) = (windows.n_windows(), windows.n_frames(), windows.n_slots());
         let pairs = TensorData::new(windows.rows().pairs(), [n_batch, n_frames, n_slots * n_slots, POSITION_WIDTH]);
@@ -163,7 +167,7 @@ impl Encoder for ObjectCentric {
         ObjectDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
     }
 
-    fn read(&self, demonstration: &ObjectDemonstration, states: &[f32]) -> ObjectReading {
+    fn read(&self, demonstration: &ObjectDemonstration, states: &[f32], (): &()) -> ObjectReading {
         let padding = demonstration.padding.as_ref();
         let states = Rows { n_slots: demonstration.objects.dims()[2], values: states };
         let objects = self.compare(demonstration, states);

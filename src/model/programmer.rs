@@ -15,6 +15,7 @@ use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
 use crate::model::layers::{Init, repeat_row};
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CoreOutput, Given, Network};
+use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
 use crate::model::windows::Windows;
 use crate::program::Program;
@@ -71,20 +72,36 @@ impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argumen
     const DECISIONS: Decisions = S::DECISIONS;
     const IS_RECURRENT: bool = C::IS_RECURRENT;
 
+    type Percepts = E::Percepts;
     type Demonstration = E::Demonstration;
     type Reading = E::Reading;
     type Recall = C::Recall;
 
-    fn demonstration(&self, windows: &Windows) -> E::Demonstration {
-        self.encoder.demonstration(windows)
+    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
+        self.encoder = self.encoder.acquainted(sample, seed);
+        self
+    }
+
+    fn perceive(&self, pictures: &Pictures) -> E::Percepts {
+        self.encoder.perceive(pictures)
+    }
+
+    fn demonstration(&self, windows: &Windows, percepts: &E::Percepts) -> E::Demonstration {
+        self.encoder.demonstration(windows, percepts)
     }
 
     fn window(demonstration: &E::Demonstration, span: Span) -> E::Demonstration {
         E::window(demonstration, span)
     }
 
-    fn read(&self, demonstration: &E::Demonstration, states: &[f32], _given: &[Given]) -> E::Reading {
-        self.encoder.read(demonstration, states)
+    fn read(
+        &self,
+        demonstration: &E::Demonstration,
+        states: &[f32],
+        percepts: &E::Percepts,
+        _given: &[Given],
+    ) -> E::Reading {
+        self.encoder.read(demonstration, states, percepts)
     }
 
     fn core(

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::trace::SpecificationForm;
+
 /// A kind of network. A plain name has the object-centric encoder; `_paper` behind it means the paper's flattened one.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
@@ -36,6 +38,8 @@ pub enum Variant {
     Npi,
     /// The same with observations as one vector.
     NpiPaper,
+    /// NTP from pictures alone, end to end, which it sees as colour slots.
+    NtpVidE2e,
 }
 
 /// The parts of a network, but for its encoder.
@@ -62,11 +66,13 @@ pub enum EncoderKind {
     ObjectCentric,
     /// As one vector: the paper's.
     Flattened,
+    /// As pictures, in which things are told apart by colour.
+    ColourSlots,
 }
 
 impl Variant {
     /// Every variant.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Ntp,
         Self::NtpPaper,
         Self::NtpGru,
@@ -79,6 +85,7 @@ impl Variant {
         Self::FlatGruPaper,
         Self::Npi,
         Self::NpiPaper,
+        Self::NtpVidE2e,
     ];
 
     /// The name in files and reports.
@@ -96,13 +103,14 @@ impl Variant {
             Self::FlatGruPaper => "flat_gru_paper",
             Self::Npi => "npi",
             Self::NpiPaper => "npi_paper",
+            Self::NtpVidE2e => "ntp_vid_e2e",
         }
     }
 
     /// What its parts are, but for the encoder.
     pub fn architecture(self) -> Architecture {
         match self {
-            Self::Ntp | Self::NtpPaper => Architecture::Ntp,
+            Self::Ntp | Self::NtpPaper | Self::NtpVidE2e => Architecture::Ntp,
             Self::NtpGru | Self::NtpGruPaper => Architecture::NtpGru,
             Self::NtpNoScope | Self::NtpNoScopePaper => Architecture::NtpNoScope,
             Self::Flat | Self::FlatPaper => Architecture::Flat,
@@ -123,7 +131,18 @@ impl Variant {
             | Self::FlatPaper
             | Self::FlatGruPaper
             | Self::NpiPaper => EncoderKind::Flattened,
+            Self::NtpVidE2e => EncoderKind::ColourSlots,
         }
+    }
+
+    /// Whether it is given pictures in place of positions.
+    pub fn sees(self) -> bool {
+        self.encoder() == EncoderKind::ColourSlots
+    }
+
+    /// The form of task specification that it reads, when another is asked for where it has a choice.
+    pub fn specification(self, asked: SpecificationForm) -> SpecificationForm {
+        if self.sees() { SpecificationForm::Video } else { asked }
     }
 }
 

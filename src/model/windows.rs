@@ -53,6 +53,16 @@ impl Windows {
         Self::stack(n_slots, MAX_WORDS, windows)
     }
 
+    /// Stacks windows of a video: rows of one number each, which says which of some percepts the frame shows.
+    pub fn of_pictures(n_slots: usize, windows: &[&[f32]]) -> Self {
+        Self::stack(n_slots, 1, windows)
+    }
+
+    /// The number of each frame's picture, `[windows * frames]`; zero beyond a window.
+    pub(crate) fn picture_rows(&self) -> &[f32] {
+        &self.rows
+    }
+
     /// Which words of a vocabulary of `n_words` each sentence has: `[windows * frames, n_words]`.
     pub(crate) fn bags_of_words(&self, n_words: usize) -> Vec<f32> {
         let mut bags = vec![0.0; self.rows.len() / MAX_WORDS * n_words];

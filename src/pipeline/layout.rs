@@ -66,8 +66,8 @@ impl RunDir {
 
 /// The folder name of a trained model.
 pub(super) fn model_name(spec: &ModelSpec, seed: u64) -> String {
-    let specification = match spec.specification {
-        SpecificationForm::Trajectories => String::new(),
+    let specification = match spec.specification() {
+        SpecificationForm::Trajectories | SpecificationForm::Video => String::new(),
         form @ SpecificationForm::Instructions => format!("-{form}"),
     };
     let tasks = spec.train_tasks.map(|tasks| format!("-tasks{tasks}")).unwrap_or_default();

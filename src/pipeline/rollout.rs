@@ -134,12 +134,12 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
     let acted = Acted {
         training_seed: seed,
         train_tasks: Some(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
-        specification: Some(spec.specification.name()),
+        specification: Some(spec.specification().name()),
         decoder: Some(decoder.name()),
     };
     let name = model_name(spec, seed);
     let folder = context.dir.model(&name).path().to_owned();
-    Learned { folder, variant: spec.variant, specification: spec.specification, decoder, acted }
+    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, acted }
 }
 
 impl Learned {
@@ -241,7 +241,7 @@ impl Suite<'_> {
         let config = simulation_config(recorded, &context.pipeline.spec.generate.simulation);
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
         let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
-        Ok(Start { task, demonstration, world: Box::new(world), provenance })
+        Ok(Start { task, demonstration, world: Box::new(world), eye: None, provenance })
     }
 
     /// The expert's demonstration of a task, from initial positions that no training demonstration has.

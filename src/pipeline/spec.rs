@@ -130,10 +130,14 @@ pub struct ModelSpec {
 }
 
 impl ModelSpec {
+    /// What it reads as task specification.
+    pub fn specification(&self) -> SpecificationForm {
+        self.variant.specification(self.specification)
+    }
+
     /// One of its training runs.
     pub fn training(&self, seed: u64) -> Training {
-        let Self { variant, specification, .. } = *self;
-        Training { variant, specification, seed, config: self.training.clone() }
+        Training { variant: self.variant, specification: self.specification(), seed, config: self.training.clone() }
     }
 }
 

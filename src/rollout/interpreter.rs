@@ -7,14 +7,16 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
-use crate::model::Decisions;
+use crate::model::{Decisions, Pictures};
 use crate::program::Program;
 use crate::robot::{Action, RobotApi, judge};
 use crate::rollout::divergence::divergence;
 use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
+use crate::scene::Scene;
 use crate::task::Task;
 use crate::trace::{
-    CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Push, SpecificationForm, TraceError,
+    CallRecorder, Cause, Episode, EpisodeParts, Frame, NewCall, Outcome, Provenance, Push, SpecificationForm,
+    TraceError,
 };
 
 /// An episode about to be acted: a demonstration, and a world of another trial.
@@ -25,8 +27,19 @@ pub struct Start<'t> {
     pub demonstration: Episode,
     /// The world to act in.
     pub world: Box<dyn RobotApi + Send>,
+    /// What a policy that sees looks with; `None` for one that is given positions.
+    pub eye: Option<Box<dyn Eye>>,
     /// Where the new episode comes from.
     pub provenance: Provenance,
+}
+
+/// A camera before the world, and before the demonstration.
+pub trait Eye: Send {
+    /// Adds a picture of a frame.
+    fn look(&mut self, scene: &Scene, frame: &Frame, into: &mut Pictures);
+
+    /// No pictures yet, of its size.
+    fn nothing(&self) -> Pictures;
 }
 
 /// When a rollout is given up.
@@ -91,6 +104,9 @@ pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> R
 struct Running<'t> {
     task: &'t Task,
     world: Box<dyn RobotApi + Send>,
+    eye: Option<Box<dyn Eye>>,
+    /// What the eye sees now.
+    seen: Arc<Pictures>,
     provenance: Provenance,
     specification: Arc<Specification>,
     expectation: Expectation,
@@ -106,14 +122,21 @@ struct Running<'t> {
 
 impl<'t> Running<'t> {
     fn new(start: Start<'t>, decisions: Decisions, reads: SpecificationForm, limits: Limits) -> Self {
-        let Start { task, demonstration, world, provenance } = start;
+        let Start { task, demonstration, world, mut eye, provenance } = start;
         let demonstration = demonstration.boundaries_only();
         let expectation =
             Expectation::new(decisions, &demonstration, world.scene()).specified_in(reads, &demonstration);
-        let specification = Arc::new(Specification::in_form(reads, &demonstration));
+        let specification = match &mut eye {
+            Some(eye) if reads == SpecificationForm::Video => video(eye.as_mut(), &demonstration),
+            _ => Specification::in_form(reads, &demonstration),
+        };
+        let specification = Arc::new(specification);
+        let seen = Arc::new(seen(&mut eye, world.as_ref()));
         Self {
             task,
             world,
+            eye,
+            seen,
             provenance,
             calls: CallRecorder::new(task.family.root_program(), specification.whole()),
             specification,
@@ -139,6 +162,7 @@ impl<'t> Running<'t> {
             window: top.output.unwrap_or(top.input),
             program: top.program,
             observation: self.world.now().observation(),
+            seen: Arc::clone(&self.seen),
         })
     }
 
@@ -157,6 +181,9 @@ impl<'t> Running<'t> {
             && let Err(cause) = self.world.act(action)
         {
             self.first_fault.get_or_insert((number, cause));
+        }
+        if program.is_primitive() {
+            self.seen = Arc::new(seen(&mut self.eye, self.world.as_ref()));
         }
         if !program.is_composite() {
             self.calls.returned(self.frame());
@@ -211,4 +238,19 @@ impl<'t> Running<'t> {
             pushes: self.world.pushes().map(<[Push]>::to_vec),
         })
     }
+}
+
+/// What an eye sees of the world now; nothing without an eye.
+fn seen(eye: &mut Option<Box<dyn Eye>>, world: &dyn RobotApi) -> Pictures {
+    let Some(eye) = eye else { return Pictures::default() };
+    let mut picture = eye.nothing();
+    eye.look(world.scene(), world.now(), &mut picture);
+    picture
+}
+
+/// What an eye sees of a demonstration's boundary frames.
+fn video(eye: &mut dyn Eye, demonstration: &Episode) -> Specification {
+    let mut pictures = eye.nothing();
+    demonstration.boundary_frames().for_each(|(_, frame)| eye.look(&demonstration.scene, frame, &mut pictures));
+    Specification::video(demonstration, pictures)
 }

@@ -137,7 +137,8 @@ impl<N: Network> LearnedPolicy<N> {
             .into_par_iter()
             .map(|specification| Known {
                 specification: Arc::clone(specification),
-                demonstration: network.demonstration(&windows(specification)),
+                demonstration: network
+                    .demonstration(&windows(specification), &network.perceive(&specification.pictures)),
             })
             .collect();
         self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
@@ -165,7 +166,9 @@ impl<N: Network> LearnedPolicy<N> {
             return (Decision::end(query), [Running::called_with(given), callee(Default::default())]);
         };
         let window = N::window(&known.demonstration, query.window);
-        let reading = self.network.read(&window, &query.observation.to_flat(), &[given]);
+        let percepts = self.network.perceive(&query.seen);
+        let state = if query.seen.n > 0 { vec![0.0] } else { query.observation.to_flat() };
+        let reading = self.network.read(&window, &state, &percepts, &[given]);
         let (core, recall) = self.network.core(&reading, query.program, &[1], recall);
         let (decision, arguments) = self.decision(query, &reading, &core);
         (decision, [Running { given, recall: Some(recall) }, callee(arguments)])
@@ -247,6 +250,7 @@ fn windows(specification: &Specification) -> Windows {
     match specification.form {
         SpecificationForm::Trajectories => Windows::new(specification.n_slots, &rows),
         SpecificationForm::Instructions => Windows::of_instructions(specification.n_slots, &rows),
+        SpecificationForm::Video => Windows::of_pictures(specification.n_slots, &rows),
     }
 }
 

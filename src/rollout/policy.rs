@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::model::Decisions;
+use crate::model::{Decisions, Pictures};
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{Episode, Observation, Prediction, Span, SpecificationForm, instructions};
@@ -19,7 +19,10 @@ pub struct Specification {
     /// Boundary frames, or sentences.
     pub n_frames: usize,
     /// `[n_frames, 3 * n_slots + 2]`, or `[n_frames, MAX_WORDS]` of words as numbers, row by row.
+    /// With pictures `[n_frames]`, which of them each frame shows.
     pub rows: Vec<f32>,
+    /// The pictures of a video; none in another form.
+    pub pictures: Pictures,
 }
 
 impl Specification {
@@ -46,8 +49,10 @@ pub struct Query {
     pub window: Span,
     /// The running program.
     pub program: Program,
-    /// What is seen now.
+    /// Where things are now.
     pub observation: Observation,
+    /// The picture of now, for a policy that sees, which is given it in place of the observation; none for another.
+    pub seen: Arc<Pictures>,
 }
 
 /// The answer: one step of the running program.
@@ -98,6 +103,19 @@ impl Specification {
         match form {
             SpecificationForm::Trajectories => Self::of(episode),
             SpecificationForm::Instructions => Self::instructions(episode),
+            SpecificationForm::Video => Self::video(episode, Pictures::default()),
+        }
+    }
+
+    /// The video of an episode: pictures of its boundary frames.
+    pub fn video(episode: &Episode, pictures: Pictures) -> Self {
+        let n_frames = episode.boundary_frames().count();
+        Self {
+            form: SpecificationForm::Video,
+            n_frames,
+            rows: (0..n_frames).map(|frame| frame as f32).collect(),
+            pictures,
+            ..Self::of(episode)
         }
     }
 
@@ -107,7 +125,7 @@ impl Specification {
         let rows = instructions.iter().flat_map(|instruction| instruction.words).map(f32::from).collect();
         let (n_slots, n_frames) = (episode.scene.slots.len(), instructions.len());
         let task_id = episode.provenance.task_id.clone();
-        Self { task_id, n_slots, form: SpecificationForm::Instructions, n_frames, rows }
+        Self { task_id, n_slots, form: SpecificationForm::Instructions, n_frames, rows, pictures: Pictures::default() }
     }
 
     /// The boundary frames of an episode.
@@ -116,6 +134,6 @@ impl Specification {
         let n_slots = episode.scene.slots.len();
         let n_frames = rows.len() / Observation::width(n_slots);
         let task_id = episode.provenance.task_id.clone();
-        Self { task_id, n_slots, form: SpecificationForm::Trajectories, n_frames, rows }
+        Self { task_id, n_slots, form: SpecificationForm::Trajectories, n_frames, rows, pictures: Pictures::default() }
     }
 }

@@ -19,17 +19,20 @@ pub enum SpecificationForm {
     Trajectories,
     /// A sentence for each part of the task, such as `pick block_D`, `place on block_E`.
     Instructions,
+    /// A picture of each boundary frame of a demonstration.
+    Video,
 }
 
 impl SpecificationForm {
     /// Every form.
-    pub const ALL: [Self; 2] = [Self::Trajectories, Self::Instructions];
+    pub const ALL: [Self; 3] = [Self::Trajectories, Self::Instructions, Self::Video];
 
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Trajectories => "trajectories",
             Self::Instructions => "instructions",
+            Self::Video => "video",
         }
     }
 }

@@ -7,7 +7,7 @@
 
 use rand::Rng;
 
-use crate::model::{Given, Windows};
+use crate::model::{Given, Pictures, Windows};
 use crate::program::Program;
 use crate::seed::Seed;
 use crate::task::Family;
@@ -21,9 +21,26 @@ use crate::training::recovery;
 /// and a part for each of two cores. A fixed number, since the sum of gradients must not depend on the machine.
 const SPLIT_FRAMES: usize = 192;
 
+/// Parts that are learned from together, with the pictures that they look at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Group {
+    /// Each once; none where observations are read.
+    pub pictures: Pictures,
+    /// Their decisions.
+    pub parts: Vec<Part>,
+}
+
+impl From<Part> for Group {
+    fn from(part: Part) -> Self {
+        Self { pictures: Pictures::default(), parts: vec![part] }
+    }
+}
+
 /// A part of a mini-batch, all of one running program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
+    /// Which of the step's mini-batches it is part of.
+    pub batch_idx: usize,
     /// Which of [`Examples::levels`].
     pub level_idx: usize,
     /// The running program.
@@ -49,8 +66,8 @@ pub struct Part {
 }
 
 /// Decisions of one call that are learned together, all with the same window.
-struct Run {
-    decisions: Vec<Views>,
+pub(super) struct Run {
+    pub(super) decisions: Vec<Views>,
 }
 
 impl Run {
@@ -113,14 +130,14 @@ fn packed(mut runs: Vec<Run>) -> (Vec<Views>, Vec<usize>) {
 
 /// How many labels a mini-batch has.
 #[derive(Clone, Copy)]
-struct Counts {
+pub(super) struct Counts {
     examples: usize,
     scoped_frames: usize,
     arguments: usize,
 }
 
 impl Counts {
-    fn of<'d>(drawn: impl Iterator<Item = &'d Views> + Clone) -> Self {
+    pub(super) fn of<'d>(drawn: impl Iterator<Item = &'d Views> + Clone) -> Self {
         let scoped = drawn.clone().filter(|prepared| prepared.example.scope.is_some());
         Self {
             examples: drawn.clone().count(),
@@ -176,13 +193,14 @@ fn prepare(
     views
 }
 
-fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
+pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
     let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
     let windows = match examples.specification() {
         SpecificationForm::Trajectories => Windows::new(n_slots, &slices),
         SpecificationForm::Instructions => Windows::of_instructions(n_slots, &slices),
+        SpecificationForm::Video => Windows::of_pictures(n_slots, &slices),
     };
     let weight = 1.0 / counts.examples as f32;
     let one_hot = |width: usize, hot: Option<usize>, value: f32| {
@@ -203,6 +221,7 @@ fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: C
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
     Part {
+        batch_idx: 0,
         level_idx,
         program: examples.levels().nth(level_idx).map_or(Program::None, |(program, _)| program),
         steps,

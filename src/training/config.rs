@@ -29,10 +29,17 @@ impl Training {
     /// [`TrainError::Config`] for the first that does not, with what is allowed.
     pub fn check(&self) -> Result<(), TrainError> {
         self.config.check()?;
-        if self.specification == SpecificationForm::Trajectories {
+        let refuse = |key, found, allowed| Err(TrainError::Config { key, found, allowed });
+        if self.variant.sees() && self.config.curriculum != Curriculum::Equal {
+            return refuse("curriculum", "adaptive".to_owned(), "equal with variants that see");
+        }
+        if self.variant.sees() != (self.specification == SpecificationForm::Video) {
+            let found = format!("{} with variant {}", self.specification, self.variant);
+            return refuse("specification", found, "video with variants that see, and with no other");
+        }
+        if self.specification != SpecificationForm::Instructions {
             return Ok(());
         }
-        let refuse = |key, found, allowed| Err(TrainError::Config { key, found, allowed });
         if self.variant != Variant::Ntp {
             let found = format!("{} with variant {}", self.specification, self.variant);
             return refuse("specification", found, "instructions with variant ntp alone");
@@ -53,6 +60,7 @@ impl Training {
         let (steps, learning_rate, relabel_slots, gripper_jitter, recovery_states) = match self.variant.encoder() {
             EncoderKind::ObjectCentric => (1000, 0.003, 0.0, 0.2, 0.25),
             EncoderKind::Flattened => (3000, 0.002, 1.0, 0.0, 0.0),
+            EncoderKind::ColourSlots => (2000, 0.003, 0.0, 0.0, 0.0),
         };
         // What a task does to which slot stands in the weights of a model without a specification.
         let relabel_slots = if self.variant.architecture() == Architecture::Npi { 0.0 } else { relabel_slots };

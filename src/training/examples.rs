@@ -176,6 +176,7 @@ impl<'d> Examples<'d> {
             SpecificationForm::Instructions => {
                 instructions[rows].iter().flat_map(|instruction| instruction.words).map(f32::from).collect()
             }
+            SpecificationForm::Video => (rows.start..rows.end).map(|frame| frame as f32).collect(),
         }
     }
 
@@ -204,6 +205,32 @@ impl<'d> Examples<'d> {
                 return examples;
             }
         }
+    }
+
+    /// Draws two trials of a task, or one twice where there is no other.
+    pub(super) fn draw_pair(&self, rng: &mut impl Rng) -> [usize; 2] {
+        let trials = &self.tasks[rng.random_range(0..self.tasks.len())];
+        let own = rng.random_range(0..trials.len());
+        let other = if trials.len() > 1 { (own + rng.random_range(1..trials.len())) % trials.len() } else { own };
+        [trials[own], trials[other]]
+    }
+
+    /// Draws a decision of a level in one of two trials, with the other for a demonstration; nothing when the level's
+    /// program does not run there.
+    pub(super) fn draw_of_pair(
+        &self,
+        level_idx: usize,
+        [own, other]: [usize; 2],
+        pairing: Pairing,
+        rng: &mut impl Rng,
+    ) -> Option<Example> {
+        let decisions = self.trees[own].decisions.get(&self.levels[level_idx].program)?;
+        let call = *self.grain.draw(decisions, rng).first()?;
+        let demonstration = match pairing {
+            Pairing::Cross => other,
+            Pairing::Own => own,
+        };
+        self.example(own, call, demonstration).or_else(|| self.example(own, call, own))
     }
 
     /// The decision behind a call of a trial, with another trial's demonstration; nothing when that one has no part
@@ -297,7 +324,9 @@ impl<'d> Examples<'d> {
 /// Each call's part of a trial's specification. Every decision is made on one, so a trial without any is refused.
 fn parts_of(trial: &TrialData, specification: SpecificationForm) -> Result<Vec<Option<Span>>, TrainError> {
     let parts: Vec<Option<Span>> = match specification {
-        SpecificationForm::Trajectories => trial.calls.iter().map(|call| call.output).collect(),
+        SpecificationForm::Trajectories | SpecificationForm::Video => {
+            trial.calls.iter().map(|call| call.output).collect()
+        }
         SpecificationForm::Instructions => instruction_spans(&trial.calls, &trial.instructions),
     };
     match parts.first() {

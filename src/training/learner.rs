@@ -1,9 +1,9 @@
-//! One step of the optimizer: losses of the parts, their gradients, Adam.
+//! One step of the optimizer: losses of the groups' parts, their gradients, Adam.
 //!
 //! # Invariants
 //!
-//! Parts run side by side on the current rayon pool, each on a copy of the parameters with a gradient graph of its
-//! own. Their gradients are summed in the order of the parts, so the pool's size changes nothing.
+//! Groups run side by side on the current rayon pool, each on a copy of the parameters with a gradient graph of its
+//! own. Their gradients are summed in the order of the groups, so the pool's size changes nothing.
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
@@ -14,7 +14,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use crate::model::Network;
 use crate::program::Program;
 use crate::trace::ScopingLabel;
-use crate::training::batch::Part;
+use crate::training::batch::{Group, Part};
 use crate::training::config::LossWeights;
 
 /// Losses of a part or a mini-batch, before they are weighed.
@@ -94,14 +94,14 @@ impl<N: Network> Learner<N> {
         Ok(Self { optimizer, ..self })
     }
 
-    /// Learns from parts; their losses, in the same order.
+    /// Learns from groups; the losses of their parts, in the same order.
     #[must_use]
-    pub fn step(self, parts: &[Part], learning_rate: f64) -> (Self, Vec<Losses>) {
+    pub fn step(self, groups: &[Group], learning_rate: f64) -> (Self, Vec<Losses>) {
         let device = self.network.device();
-        let copies: Vec<(N, &Part)> = parts.iter().map(|part| (self.network.clone().fork(&device), part)).collect();
+        let copies: Vec<(N, &Group)> = groups.iter().map(|group| (self.network.clone().fork(&device), group)).collect();
         let weights = self.weights;
-        let results: Vec<(Losses, Vec<f32>)> =
-            copies.par_iter().map(|(network, part)| gradient(network, part, weights)).collect();
+        let results: Vec<(Vec<Losses>, Vec<f32>)> =
+            copies.par_iter().map(|(network, group)| gradient(network, group, weights)).collect();
         let mut sum = vec![0.0_f32; results.first().map_or(0, |(_, gradient)| gradient.len())];
         for (_, gradient) in &results {
             sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
@@ -110,7 +110,7 @@ impl<N: Network> Learner<N> {
         let gradients = from_flat(&self.network, &sum);
         let Self { network, mut optimizer, weights, clip_norm } = self;
         let network = optimizer.step(learning_rate, network, gradients);
-        (Self { network, optimizer, weights, clip_norm }, results.into_iter().map(|(losses, _)| losses).collect())
+        (Self { network, optimizer, weights, clip_norm }, results.into_iter().flat_map(|(losses, _)| losses).collect())
     }
 }
 
@@ -123,21 +123,29 @@ fn clip(gradient: &mut [f32], largest_norm: f32) {
     }
 }
 
-/// Losses of a part, and their gradient in the order of the network's parameters.
-fn gradient<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Losses, Vec<f32>) {
-    let (losses, total) = losses(network, part, weights);
-    let gradients = GradientsParams::from_grads(total.backward(), network);
+/// Losses of a group's parts, and the gradient of their sum in the order of the network's parameters.
+fn gradient<N: Network>(network: &N, group: &Group, weights: LossWeights) -> (Vec<Losses>, Vec<f32>) {
+    let percepts = network.perceive(&group.pictures);
+    let parts = group.parts.iter().map(|part| losses(network, part, &percepts, weights));
+    let (losses, totals): (Vec<Losses>, Vec<Tensor<1>>) = parts.unzip();
+    let total = totals.into_iter().reduce(|sum, total| sum + total);
+    let gradients = total.map(|total| GradientsParams::from_grads(total.backward(), network)).unwrap_or_default();
     let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
     network.visit(&mut flat);
     (losses, flat.flat)
 }
 
-/// Losses of a part, and the weighed sum to differentiate.
-pub fn losses<N: Network>(network: &N, part: &Part, weights: LossWeights) -> (Losses, Tensor<1>) {
+/// Losses of a part, and the weighed sum to differentiate. `percepts` are those of its group's pictures.
+pub fn losses<N: Network>(
+    network: &N,
+    part: &Part,
+    percepts: &N::Percepts,
+    weights: LossWeights,
+) -> (Losses, Tensor<1>) {
     let device = network.device();
     let n_batch = part.ends.len();
-    let demonstration = network.demonstration(&part.windows);
-    let reading = network.read(&demonstration, &part.states, &part.given);
+    let demonstration = network.demonstration(&part.windows, percepts);
+    let reading = network.read(&demonstration, &part.states, percepts, &part.given);
     let (core, _) = network.core(&reading, part.program, &part.steps, None);
     let programs = TensorData::new(part.programs.clone(), [n_batch, Program::ALL.len()]);
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));

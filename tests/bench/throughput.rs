@@ -204,13 +204,14 @@ fn first_query(demonstration: &Episode) -> ntp::rollout::Query {
         specification: std::sync::Arc::new(specification),
         program: demonstration.provenance.family.root_program(),
         observation: demonstration.frames[0].observation(),
+        seen: Default::default(),
     }
 }
 
 fn start(task: &Task, demonstration: Episode) -> Start<'_> {
     let own = trial(task, 91, 1);
     let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), 0);
-    Start { task, demonstration, world: Box::new(world(task, &own, 0)), provenance }
+    Start { task, demonstration, world: Box::new(world(task, &own, 0)), eye: None, provenance }
 }
 
 fn convert_all(recordings: &Path, out: &Path) -> u64 {

@@ -15,6 +15,8 @@ mod kinematic;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
+mod painter;
+#[cfg(test)]
 mod pipeline;
 #[cfg(test)]
 mod pipeline_suites;
@@ -30,6 +32,8 @@ mod rollout;
 mod schemas;
 #[cfg(test)]
 mod schemas_parquet;
+#[cfg(test)]
+mod seeing;
 #[cfg(test)]
 mod sim;
 #[cfg(test)]

@@ -19,7 +19,7 @@ use ntp::training::{
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
 
-fn trial_data(episode: &Episode) -> TrialData {
+pub(crate) fn trial_data(episode: &Episode) -> TrialData {
     let frames = episode.boundary_frames().map(|(_, frame)| frame.observation().to_flat());
     TrialData {
         task_id: episode.provenance.task_id.clone(),
@@ -276,7 +276,7 @@ fn short() -> TrainConfig {
 #[test]
 fn the_same_seed_gives_the_same_weights_for_any_number_of_threads() {
     let data = towers();
-    for variant in Variant::ALL {
+    for variant in Variant::ALL.into_iter().filter(|variant| !variant.sees()) {
         let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         let training = Training { variant, ..ntp(short()) };
         let on = |n| pool(n).install(|| weights(&training, &data));
@@ -373,6 +373,7 @@ fn success_rate(folder: &Path, decoder: Decoder, tasks: &[Task]) -> f32 {
             task,
             demonstration: demonstration(task, &trial(task, 101, 1), 0),
             world: Box::new(KinematicWorld::new(task.family, &own)),
+            eye: None,
             provenance: Provenance::new(task, &own, Actor::Policy(String::new()), 0),
         }
     };

@@ -1,0 +1,282 @@
+//! The encoder of videos: what a perception finds in each picture is compared, picture by picture, with what it finds
+//! in the picture of now.
+//!
+//! ```text
+//! for each pair (i, k) of percepts: displacement then, displacement now            ─► max over k ─► e_ji
+//! for each percept i: e_ji, and how it lies to the robot and how it looks, then and now ─► u_ji ─► max over i ─► v_j
+//! temporal convolution over v_j ─► y_j ─► scoping labels;  max and last of them ─► core
+//! temporal convolution over u_ji for each percept ─► all of them ─► argument
+//! ```
+//!
+//! # Invariants
+//!
+//! A picture is looked at once, however many decisions it takes part in: their windows are gathered from its percepts.
+//!
+//! # Source
+//!
+//! The form of [`super::object_centric`], in the picture's plane. Which percept is which object nobody says: the layer
+//! that names the argument learns it.
+
+use burn::module::{Module, ModuleDisplay};
+use burn::nn::Linear;
+use burn::tensor::activation::relu;
+use burn::tensor::{Device, Int, Tensor, TensorData};
+use serde::{Deserialize, Serialize};
+
+use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
+use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::perception::{PERCEPT_WIDTH, Perception};
+use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::summary::summarize;
+use crate::model::windows::{Padding, Windows};
+use crate::seed::Seed;
+use crate::trace::Span;
+
+/// Features of a place or displacement in the picture: two linear, two bumps at zero.
+const PLACE_WIDTH: usize = 4;
+/// Features of a percept: how it lies to the robot, where it is, how it looks, and how the robot looks.
+const OBJECT_WIDTH: usize = PLACE_WIDTH + 2 * PERCEPT_WIDTH;
+/// Scale of the linear features, per half picture.
+const LINEAR_GAIN: f32 = 3.0;
+/// A bump has fallen to 1/e at about the width of a block.
+const BUMP_GAIN: f32 = 8.0;
+
+/// Widths of the encoder of videos.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SightedConfig<P> {
+    /// Of the perception.
+    pub perception: P,
+    /// Features of a pair of percepts. Default 12.
+    pub pair_width: usize,
+    /// Features of a percept, of a frame, of the state, and of every hidden layer. Default 32.
+    pub width: usize,
+    /// Width of program embeddings and keys. Default 16.
+    pub program_width: usize,
+    /// Frames that a scoping label sees around itself; odd. Default 5.
+    pub scope_kernel: usize,
+    /// Frames that an argument sees around itself; odd. Default 3.
+    pub argument_kernel: usize,
+}
+
+impl<P> SightedConfig<P> {
+    /// The default widths with a perception.
+    pub fn of(perception: P) -> Self {
+        Self { perception, pair_width: 12, width: 32, program_width: 16, scope_kernel: 5, argument_kernel: 3 }
+    }
+}
+
+/// The encoder of videos.
+#[derive(Module, Debug)]
+pub struct Sighted<P: Module> {
+    perception: P,
+    pair_demonstration: Linear,
+    pair_state: Linear,
+    pair: Linear,
+    object_seen: Mlp,
+    object_pairs: Linear,
+    object_demonstration: Linear,
+    object_state: Linear,
+    object: Linear,
+    state: Mlp,
+    scope_conv: TemporalConv,
+}
+
+/// Names an object by what the specification and the state show of every percept.
+#[derive(Module, Debug)]
+pub struct PerceptNaming {
+    conv: TemporalConv,
+    object: Linear,
+    context: Linear,
+    slots: Linear,
+}
+
+/// What every picture gives by itself, `F` pictures of `K` percepts.
+#[derive(Clone, Debug)]
+pub struct Percepts {
+    /// First layer of pairs as part of a demonstration, and as what is seen now: `[F, K * K, pair]` each.
+    pairs: [Tensor<3>; 2],
+    /// The same of percepts: `[F, K, H]` each.
+    objects: [Tensor<3>; 2],
+    /// The state with the robot, `[F, H + PERCEPT_WIDTH]`.
+    states: Tensor<2>,
+}
+
+/// Percepts of windows.
+#[derive(Clone, Debug)]
+pub struct SightedDemonstration {
+    /// `[B, T, K * K, pair]`
+    pairs: Tensor<4>,
+    /// `[B, T, K, H]`
+    objects: Tensor<4>,
+    padding: Option<Padding>,
+}
+
+/// Demonstration and state, compared.
+#[derive(Clone, Debug)]
+pub struct SightedReading {
+    /// Each percept in each frame, `[B, T, K, H]`.
+    objects: Tensor<4>,
+    /// Each frame with its neighbours, `[B, T, H]`; zero beyond a window.
+    frames: Tensor<3>,
+    /// Most and last of the window, `[B, 2 H]`.
+    context: Tensor<2>,
+    /// The state with the robot, `[B, H + PERCEPT_WIDTH]`.
+    state: Tensor<2>,
+    padding: Option<Padding>,
+}
+
+impl<P: Perception> Sighted<P> {
+    /// Each percept in each frame, compared with its pairs and itself now: `[B, T, K, H]`.
+    fn compare(&self, demonstration: &SightedDemonstration, pairs_now: Tensor<3>, objects_now: Tensor<3>) -> Tensor<4> {
+        let SightedDemonstration { pairs, objects, padding: _ } = demonstration;
+        let [n_batch, n_frames, n_percepts, _] = objects.dims();
+        let compared = self.pair.forward(relu(pairs.clone() + pairs_now.unsqueeze_dim(1))); // [B, T, K * K, pair]
+        let n_pair = compared.dims()[3];
+        let relations = compared.reshape([n_batch * n_frames, n_percepts, n_percepts, n_pair]).max_dim(2);
+        let relations = relations.reshape([n_batch, n_frames, n_percepts, n_pair]);
+        let hidden = self.object_pairs.forward(relations) + objects.clone() + objects_now.unsqueeze_dim(1);
+        relu(self.object.forward(relu(hidden)))
+    }
+}
+
+impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
+    type Config = SightedConfig<P::Config>;
+    type Percepts = Percepts;
+    type Demonstration = SightedDemonstration;
+    type Reading = SightedReading;
+    type Argument = PerceptNaming;
+
+    fn new(config: &Self::Config, _n_slots: usize, init: &mut Init) -> Self {
+        let &SightedConfig { perception, pair_width, width, scope_kernel, .. } = config;
+        let n_object = pair_width + 2 * width;
+        Self {
+            perception: P::new(&perception, init),
+            pair_demonstration: init.part(PLACE_WIDTH, pair_width, 2 * PLACE_WIDTH),
+            pair_state: init.linear(PLACE_WIDTH, pair_width),
+            pair: init.linear(pair_width, pair_width),
+            object_seen: init.mlp(&[OBJECT_WIDTH, width, width]),
+            object_pairs: init.part(pair_width, width, n_object),
+            object_demonstration: init.part(width, width, n_object),
+            object_state: init.linear(width, width),
+            object: init.linear(width, width),
+            state: init.mlp(&[OBJECT_WIDTH, width, width]),
+            scope_conv: init.temporal_conv(scope_kernel, width, width),
+        }
+    }
+
+    fn widths(config: &Self::Config) -> Widths {
+        let &SightedConfig { width, program_width, .. } = config;
+        let (context, frame) = (2 * width, 2 * width);
+        Widths { context, state: width + PERCEPT_WIDTH, frame, program: program_width, core: vec![width] }
+    }
+
+    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
+        self.perception = self.perception.acquainted(sample, seed);
+        self
+    }
+
+    fn perceive(&self, pictures: &Pictures) -> Percepts {
+        let seen = self.perception.look(pictures); // [F, K, PERCEPT_WIDTH]
+        let [n_pictures, n_percepts, _] = seen.dims();
+        let places = seen.clone().narrow(2, 0, 2);
+        let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
+        let relative = place_features(places.clone() - robot.clone().narrow(2, 0, 2));
+        let looks = seen * LINEAR_GAIN;
+        let robots = (robot * LINEAR_GAIN).expand([n_pictures, n_percepts, PERCEPT_WIDTH]);
+        let objects = Tensor::<3>::cat(vec![relative, looks, robots.clone()], 2);
+        let columns: Tensor<4> = places.clone().unsqueeze_dim(1);
+        let rows: Tensor<4> = places.unsqueeze_dim(2);
+        let pairs = place_features(rows - columns).reshape([n_pictures, n_percepts * n_percepts, PLACE_WIDTH]);
+        let hidden = self.object_seen.forward(objects.clone());
+        let state: Tensor<2> = self.state.forward(objects).max_dim(1).squeeze_dim(1);
+        let robot = robots.narrow(1, 0, 1).squeeze_dim(1);
+        Percepts {
+            pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
+            objects: [self.object_demonstration.forward(hidden.clone()), self.object_state.forward(hidden)],
+            states: Tensor::cat(vec![state, robot], 1),
+        }
+    }
+
+    fn demonstration(&self, windows: &Windows, percepts: &Percepts) -> SightedDemonstration {
+        let device = self.device();
+        let shown = picked(windows.picture_rows(), &device);
+        let gather = |all: &Tensor<3>| {
+            let [_, n_inner, width] = all.dims();
+            all.clone().select(0, shown.clone()).reshape([windows.n_windows(), windows.n_frames(), n_inner, width])
+        };
+        SightedDemonstration {
+            pairs: gather(&percepts.pairs[0]),
+            objects: gather(&percepts.objects[0]),
+            padding: windows.padding(&device),
+        }
+    }
+
+    fn window(demonstration: &SightedDemonstration, span: Span) -> SightedDemonstration {
+        let cut = |frames: &Tensor<4>| frames.clone().narrow(1, span.begin as usize, span.len());
+        SightedDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
+    }
+
+    fn read(&self, demonstration: &SightedDemonstration, states: &[f32], percepts: &Percepts) -> SightedReading {
+        let now = picked(states, &self.device());
+        let pairs_now = percepts.pairs[1].clone().select(0, now.clone());
+        let objects_now = percepts.objects[1].clone().select(0, now.clone());
+        let objects = self.compare(demonstration, pairs_now, objects_now);
+        let padding = demonstration.padding.as_ref();
+        let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
+        let state = percepts.states.clone().select(0, now);
+        SightedReading { objects, frames, context, state, padding: demonstration.padding.clone() }
+    }
+
+    fn context(reading: &SightedReading) -> Tensor<2> {
+        reading.context.clone()
+    }
+
+    fn state(reading: &SightedReading) -> Tensor<2> {
+        reading.state.clone()
+    }
+
+    fn frames(reading: &SightedReading) -> Tensor<3> {
+        with_most_before(reading.frames.clone())
+    }
+
+    fn device(&self) -> Device {
+        self.pair.weight.device()
+    }
+}
+
+impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
+    fn new(config: &SightedConfig<P::Config>, n_slots: usize, _n_view: usize, init: &mut Init) -> Self {
+        let &SightedConfig { perception, width, program_width, argument_kernel, .. } = config;
+        let n_context = program_width + width;
+        Self {
+            conv: init.temporal_conv(argument_kernel, width, width),
+            object: init.part(2 * width, width, 2 * width + n_context),
+            context: init.linear(n_context, width),
+            slots: init.linear(P::n_percepts(&perception) * width, n_slots),
+        }
+    }
+
+    fn forward(&self, reading: &SightedReading, program: Tensor<2>, _view: Tensor<2>, hidden: Tensor<2>) -> Tensor<2> {
+        let padding = reading.padding.as_ref();
+        let objects = Padding::mask_objects(padding, reading.objects.clone());
+        let last = Padding::last_objects(padding, objects.clone());
+        let moving = Padding::mask_objects(padding, self.conv.forward(objects)).max_dim(1).squeeze_dim(1);
+        let context = self.context.forward(Tensor::cat(vec![program, hidden], 1));
+        let object = self.object.forward(Tensor::<3>::cat(vec![moving, last], 2)); // [B, K, H]
+        self.slots.forward(relu(object + context.unsqueeze_dim(1)).flatten::<2>(1, 2))
+    }
+}
+
+/// Linear and bump features of the last dimension's two coordinates.
+fn place_features<const D: usize>(places: Tensor<D>) -> Tensor<D> {
+    let bumps = (places.clone() * BUMP_GAIN).powf_scalar(2.0).neg().exp();
+    Tensor::cat(vec![places * LINEAR_GAIN, bumps], D - 1)
+}
+
+/// Rows as numbers of pictures.
+fn picked(rows: &[f32], device: &Device) -> Tensor<1, Int> {
+    let numbers: Vec<i32> = rows.iter().map(|&row| row as i32).collect();
+    let n = numbers.len();
+    Tensor::from_data(TensorData::new(numbers, [n]), device)
+}

@@ -1,0 +1,116 @@
+//! Programs from pictures: what colour slots find, what is learned, and acting on what is seen.
+
+use std::path::Path;
+
+use burn::tensor::{Device, Tensor};
+use ntp::dataset::DatasetTrials;
+use ntp::model::{ColourSlots, ColourSlotsConfig, Decoder, Perception as _, PictureSample, Variant, WEIGHTS_FILE};
+use ntp::rollout::{Eye as _, Limits, Start, load_policy, run};
+use ntp::seed::Seed;
+use ntp::task::{Family, Split, Task, sample};
+use ntp::trace::{Actor, Episode, Provenance, SpecificationForm};
+use ntp::training::{Gallery as _, Hooks, TrainConfig, Training, train, train_seeing};
+
+use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
+use crate::painter::{Painter, Paintings};
+use crate::training::trial_data;
+
+fn shown(tasks: &[Task], n_trials: u32) -> (DatasetTrials, Paintings) {
+    let of_task =
+        |task: &Task| (0..n_trials).map(|idx| demonstration(task, &trial(task, idx, 1), 0)).collect::<Vec<_>>();
+    let episodes: Vec<Episode> = tasks.iter().flat_map(of_task).collect();
+    (DatasetTrials { n_slots: 8, trials: episodes.iter().map(trial_data).collect() }, Paintings(episodes))
+}
+
+fn training(steps: u32) -> Training {
+    let config = TrainConfig { steps: Some(steps), warmup_steps: 20, ..TrainConfig::default() };
+    Training { variant: Variant::NtpVidE2e, specification: SpecificationForm::Video, seed: 0, config }
+}
+
+fn learn(training: &Training, (data, paintings): &(DatasetTrials, Paintings), folder: &Path) -> f32 {
+    let mut loss = f32::NAN;
+    let mut on_progress = |progress: ntp::training::Progress| loss = progress.loss;
+    let hooks = &mut Hooks { on_progress: &mut on_progress, should_stop: &|| false };
+    let summary = train_seeing(training, data, Some(paintings), folder, hooks).unwrap();
+    for metric in summary.metrics.iter().filter(|m| m.step % 200 == 0) {
+        eprintln!("{metric:?}");
+    }
+    loss
+}
+
+fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().try_into_vec().unwrap()
+}
+
+#[test]
+fn colour_slots_find_each_block_and_the_robot_first() {
+    let task = tower("a", &[0, 1, 2, 3], Split::Seen);
+    let (_, paintings) = shown(&[task], 12);
+    let mut sample = PictureSample { pictures: Painter.nothing(), lengths: Vec::new() };
+    for (idx, episode) in paintings.0.iter().enumerate() {
+        let n_frames = episode.boundary_frames().count();
+        paintings.fetch(idx, &(0..n_frames).collect::<Vec<_>>(), &mut sample.pictures).unwrap();
+        sample.lengths.push(n_frames);
+    }
+    let config = ColourSlotsConfig { pixels: 64, colours: 9 };
+    let mut slots = ColourSlots::fresh(&config, Seed(1), &Device::flex());
+    slots = slots.acquainted(&sample, Seed(2));
+    let mut first = Painter.nothing();
+    paintings.fetch(0, &[0], &mut first).unwrap();
+    let found = values(slots.look(&first));
+    let episode = &paintings.0[0];
+    let seen: Vec<[f32; 2]> = found.as_chunks::<4>().0.iter().map(|percept| [percept[0], percept[1]]).collect();
+    for body in episode.scene.body_indices() {
+        let at = Painter::place(&episode.frames[0].state.body_in_world(body).translation.vector);
+        let nearest = seen.iter().map(|xy| (xy[0] - at[0]).hypot(xy[1] - at[1])).fold(f32::MAX, f32::min);
+        assert!(nearest < 0.05, "{body:?}: {nearest}");
+    }
+}
+
+#[test]
+fn a_variant_that_sees_is_refused_without_pictures() {
+    let (data, _) = shown(&[tower("a", &[0, 1], Split::Seen)], 2);
+    let folder = tempfile::tempdir().unwrap();
+    let hooks = &mut Hooks { on_progress: &mut |_| (), should_stop: &|| false };
+    let error = train(&training(1), &data, folder.path(), hooks).unwrap_err().to_string();
+    assert_eq!(error, "variant is ntp_vid_e2e; allowed: variants that see only with a dataset of pictures");
+}
+
+#[test]
+fn the_same_pictures_give_the_same_weights_for_any_number_of_threads() {
+    let shown = shown(&[tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3], Split::Seen)], 3);
+    let weights = |threads| {
+        let folder = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| learn(&training(3), &shown, folder.path()));
+        std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
+    };
+    assert!(weights(1) == weights(2));
+}
+
+#[test]
+fn a_short_training_stacks_unseen_towers_from_pictures() {
+    let set = sample(Family::BlockStacking, 40, 20, Seed(3)).unwrap();
+    let (seen, unseen): (Vec<Task>, Vec<Task>) = set.tasks.into_iter().partition(|task| task.split == Split::Seen);
+    let folder = tempfile::tempdir().unwrap();
+    let steps = std::env::var("SIGHT_STEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(400);
+    let loss = learn(&training(steps), &shown(&seen, 5), folder.path());
+    let rate = success_rate(folder.path(), &unseen);
+    assert!(rate >= 0.5, "{rate} with a loss of {loss}");
+}
+
+fn success_rate(folder: &Path, tasks: &[Task]) -> f32 {
+    let (_, mut policy) = load_policy(folder, Decoder::Mss).unwrap();
+    let start = |task| {
+        let own = trial(task, 100, 1);
+        Start {
+            task,
+            demonstration: demonstration(task, &trial(task, 101, 1), 0),
+            world: Box::new(KinematicWorld::new(task.family, &own)),
+            eye: Some(Box::new(Painter)),
+            provenance: Provenance::new(task, &own, Actor::Policy(String::new()), 0),
+        }
+    };
+    let rollouts = run(policy.as_mut(), tasks.iter().map(start).collect(), Limits::default()).unwrap();
+    rollouts.iter().filter(|rollout| rollout.episode.outcome.is_success()).count() as f32 / tasks.len() as f32
+}
