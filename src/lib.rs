@@ -21,6 +21,7 @@ pub mod model;
 pub mod pipeline;
 pub mod query;
 pub mod recording;
+pub mod render;
 pub mod report;
 pub mod robot;
 pub mod rollout;

@@ -13,11 +13,12 @@ use ntp::dataset::{ConvertConfig, DatasetTrials, RecordingEpisodes, convert, rea
 use ntp::expert::demonstrate;
 use ntp::model::{Decoder, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
+use ntp::render::{Camera, Look, Renderer};
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
-use ntp::trace::{Actor, Episode, Provenance, SpecificationForm};
+use ntp::trace::{Actor, Episode, Frame, Provenance, SpecificationForm};
 use ntp::training::{Hooks, TrainConfig, Training, train};
 
 /// Runs the convert stage alone, in a process of its own, and prints its peak memory.
@@ -35,6 +36,9 @@ fn main() {
     let wanted = |name: &str| arguments.is_empty() || arguments.iter().any(|argument| argument == name);
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let bench = Bench { folder: folder.path().to_owned() };
+    if ["render_64", "render_224"].into_iter().any(wanted) {
+        render();
+    }
     if wanted("generate_sorting_40") {
         bench.generate_sorting_40();
     }
@@ -60,6 +64,24 @@ fn cpu_secs<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = ProcessTime::now();
     let value = work();
     (value, start.elapsed().as_secs_f64())
+}
+
+/// Pictures of a demonstration from the front: colours, depths and segments of the table, 8 blocks and the gripper.
+fn render() {
+    let tasks = stacking_tasks();
+    let task = tasks.of_split(Split::Seen).next().expect("there are tasks");
+    let episode = demonstration(task, &trial(task, 0, 1), 0, 10);
+    for (name, look) in [("", Look::plain()), ("_smooth", Look::smooth())] {
+        for (size, n_frames) in [(64, 4000), (224, 400)] {
+            let camera = Camera::front(Family::BlockStacking, [size, size]);
+            let mut renderer = Renderer::new(look.clone());
+            renderer.draw(&episode.scene, &episode.frames[0].state, &camera);
+            let frames = episode.frames.iter().cycle().take(n_frames);
+            let mut draw = |frame: &Frame| renderer.draw(&episode.scene, &frame.state, &camera).segments.len();
+            let (_, secs) = cpu_secs(|| frames.map(&mut draw).sum::<usize>());
+            report(&format!("render_{size}{name}"), n_frames as f64 / secs, "frames per CPU-second");
+        }
+    }
 }
 
 struct Bench {

@@ -25,6 +25,8 @@ mod query;
 #[cfg(test)]
 mod recording;
 #[cfg(test)]
+mod render;
+#[cfg(test)]
 mod report;
 #[cfg(test)]
 mod rollout;

@@ -1,0 +1,79 @@
+//! What a camera saw: colours, depths and segments.
+
+use crate::scene::BodyIndex;
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Segment {
+    /// Nothing.
+    Background,
+    /// The table.
+    Table,
+    /// The gripper or its stem.
+    Gripper,
+    /// A body.
+    Body(BodyIndex),
+}
+
+impl Segment {
+    /// As pictures hold it: background 0, table 1, gripper 2, then the bodies.
+    pub const fn number(self) -> u16 {
+        match self {
+            Self::Background => 0,
+            Self::Table => 1,
+            Self::Gripper => 2,
+            Self::Body(BodyIndex(index)) => index + 3,
+        }
+    }
+
+    /// From a picture's number.
+    pub const fn from_number(number: u16) -> Self {
+        match number {
+            0 => Self::Background,
+            1 => Self::Table,
+            2 => Self::Gripper,
+            _ => Self::Body(BodyIndex(number - 3)),
+        }
+    }
+}
+
+/// A rendered picture; rows from above, pixels from the left.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// Red, green, blue (sRGB) of each pixel: `[height, width, 3]`.
+    pub rgb: Vec<u8>,
+    /// Distance along the camera's axis in metres, `[height, width]`; infinite where there is nothing.
+    pub depth_m: Vec<f32>,
+    /// See [`Segment::number`], `[height, width]`.
+    pub segments: Vec<u16>,
+}
+
+impl Picture {
+    /// What a pixel shows.
+    pub fn segment(&self, column: u32, row: u32) -> Segment {
+        Segment::from_number(self.segments[(row * self.width + column) as usize])
+    }
+
+    /// The depth of a pixel, in metres.
+    pub fn depth_at_m(&self, column: u32, row: u32) -> f32 {
+        self.depth_m[(row * self.width + column) as usize]
+    }
+
+    /// The colour of a pixel.
+    pub fn color(&self, column: u32, row: u32) -> [u8; 3] {
+        let first = 3 * (row * self.width + column) as usize;
+        [self.rgb[first], self.rgb[first + 1], self.rgb[first + 2]]
+    }
+
+    pub(super) fn resize(&mut self, width: u32, height: u32) {
+        let n_pixels = width as usize * height as usize;
+        (self.width, self.height) = (width, height);
+        self.rgb.resize(3 * n_pixels, 0);
+        self.depth_m.resize(n_pixels, f32::INFINITY);
+        self.segments.resize(n_pixels, 0);
+    }
+}

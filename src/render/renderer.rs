@@ -1,0 +1,239 @@
+//! Draws pictures, one after the other, in the same memory.
+
+use crate::geometry::{Pose, Rotation, Vec3};
+use crate::render::camera::Camera;
+use crate::render::look::Look;
+use crate::render::mesh::Mesh;
+use crate::render::model::Model;
+use crate::render::picture::{Picture, Segment};
+use crate::render::raster::{NOTHING, Raster};
+use crate::render::shade::{Drawn, Palette, Prepared, Shader};
+use crate::render::shadow::ShadowMap;
+use crate::render::view::{NEAR_M, View, clip_near};
+use crate::scene::{BodyIndex, Scene, SceneState};
+
+/// The most samples across a pixel.
+const MAX_SAMPLES: u32 = 4;
+/// The width of the sun's map, at least and at most.
+const MAP_SIZES: [usize; 2] = [96, 2048];
+/// A face that is seen from less far than this above its plane is not drawn, in metres.
+const EDGE_ON_M: f32 = 1e-5;
+
+/// A renderer with its memory. It keeps the meshes of the last scene, so that drawing a scene again costs nothing but
+/// the drawing.
+#[derive(Debug)]
+pub struct Renderer {
+    look: Look,
+    shader: Shader,
+    /// The scene that was drawn last and its meshes.
+    model: Option<(Scene, Model)>,
+    frame: Frame,
+    picture: Picture,
+}
+
+/// Memory for what a picture needs on its way.
+#[derive(Debug, Default)]
+struct Frame {
+    raster: Raster,
+    shadows: ShadowMap,
+    faces: Vec<Drawn>,
+    corners: Vec<Vec3>,
+    scratch: Vec<Vec3>,
+    polygon: Vec<[f32; 2]>,
+    palettes: Vec<Palette>,
+    n_palettes: usize,
+    /// Of a row of samples.
+    depths: Vec<f32>,
+    row: Vec<u8>,
+    sums: Vec<u16>,
+}
+
+impl Renderer {
+    /// Draws with a look.
+    pub fn new(look: Look) -> Self {
+        let shader = Shader::new(&look);
+        Self { look, shader, model: None, frame: Frame::default(), picture: Picture::default() }
+    }
+
+    /// How things look.
+    pub fn look(&self) -> &Look {
+        &self.look
+    }
+
+    /// Draws with another look from now on.
+    pub fn set_look(&mut self, look: Look) {
+        if look != self.look {
+            self.shader = Shader::new(&look);
+            self.look = look;
+            self.model = None;
+        }
+    }
+
+    /// Draws a scene at one instant as a camera sees it. The picture is the same for the same arguments and look,
+    /// whatever was drawn before.
+    pub fn draw(&mut self, scene: &Scene, state: &SceneState, camera: &Camera) -> &Picture {
+        let (_, model) = match self.model.take() {
+            Some(kept) if kept.0 == *scene => self.model.insert(kept),
+            _ => self.model.insert((scene.clone(), Model::new(scene, &self.look))),
+        };
+        let samples = self.look.samples.clamp(1, MAX_SAMPLES);
+        let things = things(model, state);
+        let to_sun = *self.shader.to_sun();
+        let map_size = (2 * camera.width.max(camera.height) as usize).clamp(MAP_SIZES[0], MAP_SIZES[1]);
+        let casters: Vec<(&Mesh, Pose)> = things[1..].iter().map(|thing| (thing.mesh, thing.in_world)).collect();
+        self.frame.shadows.draw(&casters, &to_sun, self.look.shadows, map_size);
+        let view = view(camera, state, samples);
+        let size = [camera.width, camera.height].map(|pixels| (pixels * samples) as usize);
+        self.frame.raster.clear(size[0], size[1], 0.0);
+        self.frame.faces.clear();
+        self.frame.n_palettes = 0;
+        for thing in &things {
+            self.frame.add(&view, thing, &self.shader);
+        }
+        self.picture.resize(camera.width, camera.height);
+        self.frame.color(&self.shader, &view, samples as usize, &mut self.picture);
+        &self.picture
+    }
+}
+
+/// One rigid thing in the world.
+struct Thing<'m> {
+    mesh: &'m Mesh,
+    in_world: Pose,
+    segment: Segment,
+}
+
+/// All things, the table first.
+fn things<'m>(model: &'m Model, state: &SceneState) -> Vec<Thing<'m>> {
+    let gripper = state.gripper_in_world;
+    let finger = |turn: Rotation| {
+        let beside = Pose::translation(0.0, state.opening_m / 2.0, 0.0);
+        Thing { mesh: &model.finger, in_world: gripper * turn * beside, segment: Segment::Gripper }
+    };
+    let half_turn = Rotation::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0));
+    let table = Thing { mesh: &model.table, in_world: Pose::identity(), segment: Segment::Table };
+    let hand = Thing { mesh: &model.hand, in_world: gripper, segment: Segment::Gripper };
+    let bodies = model.bodies.iter().zip(&state.bodies_in_world).enumerate().map(|(index, (mesh, in_world))| Thing {
+        mesh,
+        in_world: *in_world,
+        segment: Segment::Body(BodyIndex(index as u16)),
+    });
+    std::iter::once(table).chain(bodies).chain([hand, finger(Rotation::identity()), finger(half_turn)]).collect()
+}
+
+fn view(camera: &Camera, state: &SceneState, samples: u32) -> View {
+    let scale = samples as f32;
+    View {
+        camera_in_world: camera.in_world(state),
+        focal: camera.focal_px * scale,
+        center: camera.center_px().map(|center| (center + 0.5) * scale),
+    }
+}
+
+impl Frame {
+    /// Rasterises the faces of a thing that look at the camera.
+    fn add(&mut self, view: &View, thing: &Thing<'_>, shader: &Shader) {
+        let sight = view.sight(&thing.in_world);
+        if sight.in_camera.translation.z + thing.mesh.radius_m < NEAR_M {
+            return;
+        }
+        let rotation = sight.in_camera.rotation.to_rotation_matrix();
+        let origin = sight.in_camera.translation.vector;
+        for face in &thing.mesh.faces {
+            let above = face.normal.dot(&sight.eye) - face.offset;
+            if above < EDGE_ON_M {
+                continue;
+            }
+            self.corners.clear();
+            self.corners
+                .extend(thing.mesh.corners[face.corners.clone()].iter().map(|corner| rotation * corner + origin));
+            clip_near(&mut self.corners, &mut self.scratch);
+            if self.corners.len() < 3 {
+                continue;
+            }
+            self.polygon.clear();
+            self.polygon.extend(self.corners.iter().map(|corner| view.project(corner)));
+            let nearness = view.slope(&(rotation * face.normal / -above));
+            let owner = self.faces.len() as u32;
+            self.raster.fill(&self.polygon, &nearness, owner);
+            let shaded = shader.prepare(view, &sight, &thing.in_world, face, &mut self.n_palettes);
+            self.faces.push(shaded.of(thing.segment.number()));
+        }
+    }
+
+    /// Colours, depths and segments of all pixels.
+    fn color(&mut self, shader: &Shader, view: &View, samples: usize, picture: &mut Picture) {
+        let Self { raster, shadows, faces, palettes, n_palettes, depths, row: bytes, sums, .. } = self;
+        palettes.iter_mut().for_each(Palette::clear);
+        palettes.resize(palettes.len().max(*n_palettes), Palette::default());
+        let place = shadows.place(view);
+        let mut prepared = Prepared { faces, palettes, shadows, place, height: raster.height };
+        let width = raster.width;
+        depths.resize(width, 0.0);
+        bytes.resize(3 * width, 0);
+        let mut shade = |row: usize, rgb: &mut [u8]| {
+            let samples = row * width..(row + 1) * width;
+            let nearness = &raster.nearness[samples.clone()];
+            depths.iter_mut().zip(nearness).for_each(|(depth, nearness)| *depth = 1.0 / nearness);
+            shader.shade_row(&mut prepared, row, &raster.owner[samples], depths, rgb);
+        };
+        for (pixel_row, rgb) in picture.rgb.chunks_exact_mut(3 * width / samples).enumerate() {
+            if samples == 1 {
+                shade(pixel_row, rgb);
+                continue;
+            }
+            sums.clear();
+            sums.resize(rgb.len(), 0);
+            for row in pixel_row * samples..(pixel_row + 1) * samples {
+                shade(row, bytes);
+                add_samples(sums, bytes, samples);
+            }
+            let n_samples = (samples * samples) as u16;
+            rgb.iter_mut().zip(sums.iter()).for_each(|(value, sum)| *value = ((sum + n_samples / 2) / n_samples) as u8);
+        }
+        self.measure(samples, picture);
+    }
+
+    /// Depths and segments: those of the nearest sample of each pixel.
+    fn measure(&self, samples: usize, picture: &mut Picture) {
+        let Raster { width, nearness, owner, .. } = &self.raster;
+        let segment_of = |owner: u32| match owner {
+            NOTHING => Segment::Background.number(),
+            face => self.faces[face as usize].segment,
+        };
+        if samples == 1 {
+            picture.depth_m.iter_mut().zip(nearness).for_each(|(depth, nearness)| *depth = 1.0 / nearness);
+            picture.segments.iter_mut().zip(owner).for_each(|(segment, &owner)| *segment = segment_of(owner));
+            return;
+        }
+        let n_columns = width / samples;
+        for (pixel, (depth, segment)) in picture.depth_m.iter_mut().zip(&mut picture.segments).enumerate() {
+            let first = (pixel / n_columns) * samples * width + (pixel % n_columns) * samples;
+            let nearest = nearest_sample(nearness, *width, first, samples);
+            *depth = 1.0 / nearness[nearest];
+            *segment = segment_of(owner[nearest]);
+        }
+    }
+}
+
+/// The nearest of the samples of the pixel whose first sample is `first`.
+fn nearest_sample(nearness: &[f32], width: usize, first: usize, samples: usize) -> usize {
+    let mut nearest = first;
+    for row in 0..samples {
+        for sample in first + row * width..first + row * width + samples {
+            if nearness[sample] > nearness[nearest] {
+                nearest = sample;
+            }
+        }
+    }
+    nearest
+}
+
+/// Adds a row of samples to the sums of its pixels.
+fn add_samples(sums: &mut [u16], bytes: &[u8], samples: usize) {
+    for (sum, pixel) in sums.chunks_exact_mut(3).zip(bytes.chunks_exact(3 * samples)) {
+        for sample in pixel.chunks_exact(3) {
+            sum.iter_mut().zip(sample).for_each(|(sum, &value)| *sum += u16::from(value));
+        }
+    }
+}
