@@ -22,6 +22,8 @@ mod config;
 mod core_network;
 mod decisions;
 mod decoder;
+mod detecting;
+mod detector;
 mod encoder;
 mod features;
 mod flattened;
@@ -39,6 +41,7 @@ mod sighted;
 mod store;
 mod summary;
 mod variant;
+mod vectors;
 mod windows;
 
 pub use build::{NetworkUse, with_network};
@@ -47,8 +50,10 @@ pub use config::{ModelConfig, NetworkConfig};
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
 pub use decisions::{Decisions, MAX_ARGUMENTS};
 pub use decoder::{Decoder, LabelScores, span_score};
+pub use detecting::{Detecting, Detections};
+pub use detector::{Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig};
 pub use encoder::{ArgumentDecoder, Encoder, Widths};
-pub use flattened::{FlatDemonstration, FlatReading, Flattened, FlattenedConfig};
+pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened, FlattenedConfig};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};
 pub use memory::ProgramMemory;
 pub use network::{CoreOutput, Given, Network};
@@ -64,4 +69,5 @@ pub use store::{
     weights_to_bytes,
 };
 pub use variant::{Architecture, EncoderKind, Variant};
+pub use vectors::{Convolved, ConvolvedConfig, Positions, Vectors};
 pub use windows::Windows;

@@ -4,15 +4,19 @@ use burn::tensor::Device;
 
 use crate::model::colour_slots::ColourSlots;
 use crate::model::config::{ModelConfig, NetworkConfig};
+use crate::model::detecting::Detecting;
+use crate::model::detector::{Detector, PointDetector, VggDetector};
 use crate::model::encoder::Encoder;
-use crate::model::flattened::Flattened;
+use crate::model::flattened::{FlatEncoder, Flattened};
 use crate::model::instructed::Instructed;
+use crate::model::layers::Init;
 use crate::model::network::Network;
 use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
 use crate::model::object_centric::ObjectCentric;
 use crate::model::programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope};
 use crate::model::sighted::Sighted;
 use crate::model::variant::Architecture;
+use crate::model::vectors::Convolved;
 use crate::seed::Seed;
 
 /// Something to be done with a network, whatever its type.
@@ -35,7 +39,29 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
         NetworkConfig::ColourSlots(widths) => {
             wanted.run(Ntp::<Sighted<ColourSlots>>::new(widths, config.n_slots, seed, device))
         }
+        NetworkConfig::Convolved(widths) => {
+            wanted.run(Ntp::<FlatEncoder<Convolved>>::new(widths, config.n_slots, seed, device))
+        }
+        NetworkConfig::Detected(detector, widths) => {
+            wanted.run(detecting::<PointDetector, ObjectCentric>(detector, widths, config.n_slots, seed, device))
+        }
+        NetworkConfig::DetectedFlattened(detector, widths) => {
+            wanted.run(detecting::<VggDetector, Flattened>(detector, widths, config.n_slots, seed, device))
+        }
     }
+}
+
+/// A detector with NTP behind it. The two draw from one beginning, so that no parameters share an id.
+fn detecting<D: Detector, E: Encoder<Percepts = ()>>(
+    detector: &D::Config,
+    widths: &E::Config,
+    n_slots: usize,
+    seed: Seed,
+    device: &Device,
+) -> Detecting<D, Ntp<E>> {
+    let init = &mut Init::new(seed, device);
+    let detector = D::new(detector, n_slots, init);
+    Detecting::new(detector, Ntp::<E>::drawn(widths, n_slots, init), n_slots)
 }
 
 fn of_encoder<E: Encoder, P: CallEncoder<Config = E::Config>, U: NetworkUse>(

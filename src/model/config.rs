@@ -3,11 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::ColourSlotsConfig;
+use crate::model::detector::{PointDetectorConfig, VggDetectorConfig};
 use crate::model::flattened::FlattenedConfig;
 use crate::model::instructed::InstructedConfig;
 use crate::model::object_centric::ObjectCentricConfig;
 use crate::model::sighted::SightedConfig;
 use crate::model::variant::{EncoderKind, Variant};
+use crate::model::vectors::ConvolvedConfig;
 use crate::program::vocabulary_hash;
 use crate::task::Family;
 use crate::trace::SpecificationForm;
@@ -27,6 +29,12 @@ pub enum NetworkConfig {
     Instructed(InstructedConfig),
     /// Of [`EncoderKind::ColourSlots`].
     ColourSlots(SightedConfig<ColourSlotsConfig>),
+    /// Of [`EncoderKind::Convolved`].
+    Convolved(ConvolvedConfig),
+    /// Of [`EncoderKind::Detected`].
+    Detected(PointDetectorConfig, ObjectCentricConfig),
+    /// Of [`EncoderKind::DetectedFlattened`].
+    DetectedFlattened(VggDetectorConfig, FlattenedConfig),
 }
 
 impl NetworkConfig {
@@ -39,6 +47,14 @@ impl NetworkConfig {
             (_, EncoderKind::ColourSlots) => {
                 Self::ColourSlots(SightedConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }))
             }
+            (_, EncoderKind::Convolved) => Self::Convolved(ConvolvedConfig::of_pixels(64)),
+            (_, EncoderKind::Detected) => Self::Detected(
+                PointDetectorConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }),
+                ObjectCentricConfig::default(),
+            ),
+            (_, EncoderKind::DetectedFlattened) => {
+                Self::DetectedFlattened(VggDetectorConfig { pixels: 64, narrowed: 8 }, FlattenedConfig::default())
+            }
         }
     }
 
@@ -46,10 +62,13 @@ impl NetworkConfig {
     /// what else there is to see; widths that see nothing stay as they are.
     #[must_use]
     pub fn seeing(self, pixels: usize, n_slots: usize) -> Self {
+        let perception = ColourSlotsConfig { pixels, colours: n_slots + 1 + SPARE_COLOURS };
         match self {
-            Self::ColourSlots(config) => {
-                let perception = ColourSlotsConfig { pixels, colours: n_slots + 1 + SPARE_COLOURS };
-                Self::ColourSlots(SightedConfig { perception, ..config })
+            Self::ColourSlots(config) => Self::ColourSlots(SightedConfig { perception, ..config }),
+            Self::Convolved(config) => Self::Convolved(ConvolvedConfig { pixels, ..config }),
+            Self::Detected(config, widths) => Self::Detected(PointDetectorConfig { perception, ..config }, widths),
+            Self::DetectedFlattened(config, widths) => {
+                Self::DetectedFlattened(VggDetectorConfig { pixels, ..config }, widths)
             }
             other => other,
         }
@@ -60,7 +79,9 @@ impl NetworkConfig {
         match self {
             Self::ObjectCentric(_) | Self::Flattened(_) => SpecificationForm::Trajectories,
             Self::Instructed(_) => SpecificationForm::Instructions,
-            Self::ColourSlots(_) => SpecificationForm::Video,
+            Self::ColourSlots(_) | Self::Convolved(_) | Self::Detected(..) | Self::DetectedFlattened(..) => {
+                SpecificationForm::Video
+            }
         }
     }
 
@@ -71,6 +92,9 @@ impl NetworkConfig {
             Self::Flattened(_) => variant.encoder() == EncoderKind::Flattened,
             Self::Instructed(_) => variant == Variant::Ntp,
             Self::ColourSlots(_) => variant.encoder() == EncoderKind::ColourSlots,
+            Self::Convolved(_) => variant.encoder() == EncoderKind::Convolved,
+            Self::Detected(..) => variant.encoder() == EncoderKind::Detected,
+            Self::DetectedFlattened(..) => variant.encoder() == EncoderKind::DetectedFlattened,
         }
     }
 }

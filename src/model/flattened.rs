@@ -1,4 +1,4 @@
-//! The paper's encoder: an observation is one vector of all objects' positions.
+//! The paper's encoder: an observation is one vector, of all objects' positions or of a picture.
 //!
 //! # Source
 //!
@@ -7,13 +7,13 @@
 
 use burn::module::Module;
 use burn::nn::Linear;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
-use crate::model::features::{Rows, flat_width};
 use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
 use crate::model::pictures::Pictures;
+use crate::model::vectors::{Positions, Vectors};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
 
@@ -37,9 +37,13 @@ impl Default for FlattenedConfig {
     }
 }
 
+/// The paper's encoder of positions.
+pub type Flattened = FlatEncoder<Positions>;
+
 /// The paper's encoder.
 #[derive(Module, Debug)]
-pub struct Flattened {
+pub struct FlatEncoder<V: Module> {
+    vectors: V,
     state: Mlp,
     specification: SpecificationEncoder,
 }
@@ -102,32 +106,35 @@ pub struct FlatReading {
     state: Tensor<2>,
 }
 
-impl Encoder for Flattened {
-    type Config = FlattenedConfig;
-    type Percepts = ();
+impl<V: Vectors> Encoder for FlatEncoder<V> {
+    type Config = V::Config;
+    type Percepts = V::Percepts;
     type Demonstration = FlatDemonstration;
     type Reading = FlatReading;
     type Argument = FlatArgument;
 
-    fn new(config: &FlattenedConfig, n_slots: usize, init: &mut Init) -> Self {
-        let n_features = flat_width(n_slots);
+    fn new(config: &V::Config, n_slots: usize, init: &mut Init) -> Self {
+        let &FlattenedConfig { width, scope_kernel, .. } = V::widths(config);
+        let n_features = V::width(config, n_slots);
         Self {
-            state: init.mlp(&[n_features, config.width, config.width]),
-            specification: SpecificationEncoder::new(init, n_features, config.width, config.scope_kernel),
+            vectors: V::new(config, init),
+            state: init.mlp(&[n_features, width, width]),
+            specification: SpecificationEncoder::new(init, n_features, width, scope_kernel),
         }
     }
 
-    fn widths(config: &FlattenedConfig) -> Widths {
-        let &FlattenedConfig { width, program_width, .. } = config;
+    fn widths(config: &V::Config) -> Widths {
+        let &FlattenedConfig { width, program_width, .. } = V::widths(config);
         Widths { context: width, state: width, frame: width, program: program_width, core: vec![width, width] }
     }
 
-    fn perceive(&self, _pictures: &Pictures) {}
+    fn perceive(&self, pictures: &Pictures) -> V::Percepts {
+        self.vectors.perceive(pictures)
+    }
 
-    fn demonstration(&self, windows: &Windows, (): &()) -> FlatDemonstration {
+    fn demonstration(&self, windows: &Windows, percepts: &V::Percepts) -> FlatDemonstration {
         let device = self.device();
-        let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots())];
-        let frames = Tensor::from_data(TensorData::new(windows.rows().flat(), shape), &device);
+        let frames = V::of_windows(windows, percepts, &device);
         FlatDemonstration { n_slots: windows.n_slots(), frames, padding: windows.padding(&device) }
     }
 
@@ -136,11 +143,9 @@ impl Encoder for Flattened {
         FlatDemonstration { n_slots: demonstration.n_slots, frames, padding: None }
     }
 
-    fn read(&self, demonstration: &FlatDemonstration, states: &[f32], (): &()) -> FlatReading {
+    fn read(&self, demonstration: &FlatDemonstration, states: &[f32], percepts: &V::Percepts) -> FlatReading {
         let FlatDemonstration { n_slots, frames, padding } = demonstration;
-        let states = Rows { n_slots: *n_slots, values: states }.flat();
-        let shape = [frames.dims()[0], flat_width(*n_slots)];
-        let states = Tensor::<2>::from_data(TensorData::new(states, shape), &self.device());
+        let states = V::of_states(states, *n_slots, percepts, &self.device());
         let (convolved, summary) = self.specification.forward(frames.clone(), padding.as_ref());
         FlatReading { demonstration: demonstration.clone(), convolved, summary, state: self.state.forward(states) }
     }
@@ -162,11 +167,11 @@ impl Encoder for Flattened {
     }
 }
 
-impl ArgumentDecoder<Flattened> for FlatArgument {
-    fn new(config: &FlattenedConfig, n_slots: usize, n_view: usize, init: &mut Init) -> Self {
-        let &FlattenedConfig { width, program_width, argument_kernel, .. } = config;
+impl<V: Vectors> ArgumentDecoder<FlatEncoder<V>> for FlatArgument {
+    fn new(config: &V::Config, n_slots: usize, n_view: usize, init: &mut Init) -> Self {
+        let &FlattenedConfig { width, program_width, argument_kernel, .. } = V::widths(config);
         Self {
-            specification: SpecificationEncoder::new(init, flat_width(n_slots), width, argument_kernel),
+            specification: SpecificationEncoder::new(init, V::width(config, n_slots), width, argument_kernel),
             hidden: init.mlp(&[width + program_width + n_view, width]),
             slots: init.linear(width, n_slots),
         }

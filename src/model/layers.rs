@@ -5,7 +5,8 @@
 //! The last dimension of every tensor holds features; `[B, T, ...]` is batch and frame.
 
 use burn::module::{Module, Param, ParamId};
-use burn::nn::Linear;
+use burn::nn::conv::Conv2d;
+use burn::nn::{Linear, PaddingConfig2d};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng as _;
@@ -65,6 +66,28 @@ impl Init {
     /// The same with the inputs' width beside the layers'.
     pub(crate) fn mlp_from(&mut self, n_inputs: usize, widths: &[usize]) -> Mlp {
         self.mlp(&[&[n_inputs], widths].concat())
+    }
+
+    /// A convolution of pictures, of a square kernel.
+    pub(crate) fn conv(
+        &mut self,
+        [n_inputs, n_outputs]: [usize; 2],
+        kernel: usize,
+        stride: usize,
+        padding: PaddingConfig2d,
+    ) -> Conv2d {
+        // He's bound for rectifiers: with the smaller one of `linear` seven layers fade a picture out.
+        let bound = (6.0 / (n_inputs * kernel * kernel) as f32).sqrt();
+        let weight = self.parameter([n_outputs, n_inputs, kernel, kernel], bound);
+        Conv2d {
+            weight,
+            bias: Some(self.filled([n_outputs], 0.0)),
+            stride: [stride; 2],
+            kernel_size: [kernel; 2],
+            dilation: [1; 2],
+            groups: 1,
+            padding,
+        }
     }
 
     pub(crate) fn temporal_conv(&mut self, kernel: usize, n_inputs: usize, n_outputs: usize) -> TemporalConv {

@@ -63,6 +63,12 @@ pub trait Network: Module + Sync + 'static {
         self
     }
 
+    /// What a detector has to learn of pictures, beside what is decided: its loss against observation rows of the same
+    /// frames. Nothing where there is no detector.
+    fn detection_loss(&self, _pictures: &Pictures, _rows: &[f32]) -> Option<Tensor<1>> {
+        None
+    }
+
     /// Looks at pictures.
     fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
 

@@ -47,7 +47,11 @@ pub type FlatGru<E> = Programmer<E, NoHierarchy, GruCore, <E as Encoder>::Argume
 impl<E: Encoder, S: Scoping, C: Core> Programmer<E, S, C, E::Argument> {
     /// A fresh network for scenes of `n_slots` slots; the same seed gives the same parameters.
     pub fn new(config: &E::Config, n_slots: usize, seed: Seed, device: &Device) -> Self {
-        let init = &mut Init::new(seed, device);
+        Self::drawn(config, n_slots, &mut Init::new(seed, device))
+    }
+
+    /// The same with parameters drawn after others.
+    pub(crate) fn drawn(config: &E::Config, n_slots: usize, init: &mut Init) -> Self {
         let widths = E::widths(config);
         let Widths { context, state, frame, program, core: layers } = &widths;
         let n_hidden = widths.hidden();

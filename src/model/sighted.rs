@@ -20,7 +20,7 @@
 use burn::module::{Module, ModuleDisplay};
 use burn::nn::Linear;
 use burn::tensor::activation::relu;
-use burn::tensor::{Device, Int, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
@@ -28,6 +28,7 @@ use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
 use crate::model::perception::{PERCEPT_WIDTH, Perception};
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::summary::summarize;
+use crate::model::vectors::picked;
 use crate::model::windows::{Padding, Windows};
 use crate::seed::Seed;
 use crate::trace::Span;
@@ -272,11 +273,4 @@ impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
 fn place_features<const D: usize>(places: Tensor<D>) -> Tensor<D> {
     let bumps = (places.clone() * BUMP_GAIN).powf_scalar(2.0).neg().exp();
     Tensor::cat(vec![places * LINEAR_GAIN, bumps], D - 1)
-}
-
-/// Rows as numbers of pictures.
-fn picked(rows: &[f32], device: &Device) -> Tensor<1, Int> {
-    let numbers: Vec<i32> = rows.iter().map(|&row| row as i32).collect();
-    let n = numbers.len();
-    Tensor::from_data(TensorData::new(numbers, [n]), device)
 }

@@ -40,6 +40,12 @@ pub enum Variant {
     NpiPaper,
     /// NTP from pictures alone, end to end, which it sees as colour slots.
     NtpVidE2e,
+    /// The same, which it sees through the paper's convolutions, as one vector.
+    NtpVidE2ePaper,
+    /// NTP behind a detector on colour slots.
+    NtpVidDetector,
+    /// NTP with the paper's encoder behind a detector of VGG16's shape.
+    NtpVidDetectorPaper,
 }
 
 /// The parts of a network, but for its encoder.
@@ -68,11 +74,17 @@ pub enum EncoderKind {
     Flattened,
     /// As pictures, in which things are told apart by colour.
     ColourSlots,
+    /// As pictures, each as one vector: the paper's.
+    Convolved,
+    /// Slot by slot, as detected in pictures.
+    Detected,
+    /// As one vector, as detected in pictures: the paper's.
+    DetectedFlattened,
 }
 
 impl Variant {
     /// Every variant.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 16] = [
         Self::Ntp,
         Self::NtpPaper,
         Self::NtpGru,
@@ -86,6 +98,9 @@ impl Variant {
         Self::Npi,
         Self::NpiPaper,
         Self::NtpVidE2e,
+        Self::NtpVidE2ePaper,
+        Self::NtpVidDetector,
+        Self::NtpVidDetectorPaper,
     ];
 
     /// The name in files and reports.
@@ -104,13 +119,21 @@ impl Variant {
             Self::Npi => "npi",
             Self::NpiPaper => "npi_paper",
             Self::NtpVidE2e => "ntp_vid_e2e",
+            Self::NtpVidE2ePaper => "ntp_vid_e2e_paper",
+            Self::NtpVidDetector => "ntp_vid_detector",
+            Self::NtpVidDetectorPaper => "ntp_vid_detector_paper",
         }
     }
 
     /// What its parts are, but for the encoder.
     pub fn architecture(self) -> Architecture {
         match self {
-            Self::Ntp | Self::NtpPaper | Self::NtpVidE2e => Architecture::Ntp,
+            Self::Ntp
+            | Self::NtpPaper
+            | Self::NtpVidE2e
+            | Self::NtpVidE2ePaper
+            | Self::NtpVidDetector
+            | Self::NtpVidDetectorPaper => Architecture::Ntp,
             Self::NtpGru | Self::NtpGruPaper => Architecture::NtpGru,
             Self::NtpNoScope | Self::NtpNoScopePaper => Architecture::NtpNoScope,
             Self::Flat | Self::FlatPaper => Architecture::Flat,
@@ -132,12 +155,15 @@ impl Variant {
             | Self::FlatGruPaper
             | Self::NpiPaper => EncoderKind::Flattened,
             Self::NtpVidE2e => EncoderKind::ColourSlots,
+            Self::NtpVidE2ePaper => EncoderKind::Convolved,
+            Self::NtpVidDetector => EncoderKind::Detected,
+            Self::NtpVidDetectorPaper => EncoderKind::DetectedFlattened,
         }
     }
 
     /// Whether it is given pictures in place of positions.
     pub fn sees(self) -> bool {
-        self.encoder() == EncoderKind::ColourSlots
+        !matches!(self.encoder(), EncoderKind::ObjectCentric | EncoderKind::Flattened)
     }
 
     /// The form of task specification that it reads, when another is asked for where it has a choice.

@@ -58,6 +58,14 @@ impl Windows {
         Self::stack(n_slots, 1, windows)
     }
 
+    /// The same frames with other rows for the pictures that they show.
+    pub(crate) fn with_rows(&self, width: usize, rows: impl Fn(&[f32]) -> Vec<f32>) -> Self {
+        let windows = self.rows.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);
+        let shown: Vec<Vec<f32>> = windows.map(|(pictures, &length)| rows(&pictures[..length])).collect();
+        let slices: Vec<&[f32]> = shown.iter().map(Vec::as_slice).collect();
+        Self::stack(self.n_slots, width, &slices)
+    }
+
     /// The number of each frame's picture, `[windows * frames]`; zero beyond a window.
     pub(crate) fn picture_rows(&self) -> &[f32] {
         &self.rows

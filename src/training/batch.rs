@@ -26,13 +26,15 @@ const SPLIT_FRAMES: usize = 192;
 pub struct Group {
     /// Each once; none where observations are read.
     pub pictures: Pictures,
+    /// The observation row of each picture, for a detector to learn from.
+    pub rows: Vec<f32>,
     /// Their decisions.
     pub parts: Vec<Part>,
 }
 
 impl From<Part> for Group {
     fn from(part: Part) -> Self {
-        Self { pictures: Pictures::default(), parts: vec![part] }
+        Self { parts: vec![part], ..Self::default() }
     }
 }
 

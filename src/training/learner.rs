@@ -128,7 +128,8 @@ fn gradient<N: Network>(network: &N, group: &Group, weights: LossWeights) -> (Ve
     let percepts = network.perceive(&group.pictures);
     let parts = group.parts.iter().map(|part| losses(network, part, &percepts, weights));
     let (losses, totals): (Vec<Losses>, Vec<Tensor<1>>) = parts.unzip();
-    let total = totals.into_iter().reduce(|sum, total| sum + total);
+    let detection = network.detection_loss(&group.pictures, &group.rows);
+    let total = totals.into_iter().chain(detection).reduce(|sum, total| sum + total);
     let gradients = total.map(|total| GradientsParams::from_grads(total.backward(), network)).unwrap_or_default();
     let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
     network.visit(&mut flat);

@@ -119,7 +119,8 @@ impl Shown {
         for (trial, frames) in by_trial {
             fetch(examples, gallery, trial, &frames, &mut pictures)?;
         }
-        Ok(Group { pictures, parts: Vec::new() })
+        let rows = self.numbers.keys().flat_map(|&(trial, frame)| examples.observation_row(trial, frame)).copied();
+        Ok(Group { pictures, rows: rows.collect(), parts: Vec::new() })
     }
 
     fn number(&self, trial: usize, frame: usize) -> f32 {

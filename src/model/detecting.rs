@@ -1,0 +1,118 @@
+//! A detector before a network that reads positions: NTPVID (Detector).
+//!
+//! # Invariants
+//!
+//! The two learn apart: no gradient of a decision reaches the detector, none of a position the network behind it, which
+//! learns on what the detector finds at that time.
+//!
+//! # Source
+//!
+//! Paper, section V-D.
+
+use burn::module::{Module, ModuleDisplay};
+use burn::tensor::{Device, Tensor};
+
+use crate::model::decisions::Decisions;
+use crate::model::detector::{self, Detector};
+use crate::model::network::{CoreOutput, Given, Network};
+use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::windows::Windows;
+use crate::program::Program;
+use crate::seed::Seed;
+use crate::trace::{Observation, Span};
+
+/// A detector and a network behind it.
+#[derive(Module, Debug)]
+pub struct Detecting<D: Module, N: Module> {
+    detector: D,
+    programmer: N,
+    n_slots: usize,
+}
+
+/// Observation rows of pictures, as detected.
+#[derive(Clone, Debug)]
+pub struct Detections {
+    width: usize,
+    rows: Vec<f32>,
+}
+
+impl Detections {
+    /// The rows of some pictures, one after the other.
+    fn of(&self, pictures: &[f32]) -> Vec<f32> {
+        let row =
+            |&picture: &f32| self.rows.get(picture as usize * self.width..).and_then(|rows| rows.get(..self.width));
+        pictures.iter().filter_map(row).flatten().copied().collect()
+    }
+}
+
+impl<D: Detector, N: Network<Percepts = ()>> Detecting<D, N> {
+    /// Both together, for scenes of `n_slots` slots.
+    pub fn new(detector: D, programmer: N, n_slots: usize) -> Self {
+        Self { detector, programmer, n_slots }
+    }
+}
+
+impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecting<D, N> {
+    const DECISIONS: Decisions = N::DECISIONS;
+    const IS_RECURRENT: bool = N::IS_RECURRENT;
+
+    type Percepts = Detections;
+    type Demonstration = N::Demonstration;
+    type Reading = N::Reading;
+    type Recall = N::Recall;
+
+    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
+        self.detector = self.detector.acquainted(sample, seed);
+        self
+    }
+
+    fn detection_loss(&self, pictures: &Pictures, rows: &[f32]) -> Option<Tensor<1>> {
+        (pictures.n > 0).then(|| detector::loss(self.detector.detect(pictures), self.n_slots, rows))
+    }
+
+    fn perceive(&self, pictures: &Pictures) -> Detections {
+        let rows = if pictures.n > 0 { detector::rows(self.detector.detect(pictures)) } else { Vec::new() };
+        Detections { width: Observation::width(self.n_slots), rows }
+    }
+
+    fn demonstration(&self, windows: &Windows, percepts: &Detections) -> N::Demonstration {
+        let detected = windows.with_rows(percepts.width, |pictures| percepts.of(pictures));
+        self.programmer.demonstration(&detected, &())
+    }
+
+    fn window(demonstration: &N::Demonstration, span: Span) -> N::Demonstration {
+        N::window(demonstration, span)
+    }
+
+    fn read(
+        &self,
+        demonstration: &N::Demonstration,
+        states: &[f32],
+        percepts: &Detections,
+        given: &[Given],
+    ) -> N::Reading {
+        self.programmer.read(demonstration, &percepts.of(states), &(), given)
+    }
+
+    fn core(
+        &self,
+        reading: &N::Reading,
+        program: Program,
+        steps: &[usize],
+        recall: Option<N::Recall>,
+    ) -> (CoreOutput, N::Recall) {
+        self.programmer.core(reading, program, steps, recall)
+    }
+
+    fn scope(&self, reading: &N::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>> {
+        self.programmer.scope(reading, program, core)
+    }
+
+    fn argument(&self, reading: &N::Reading, program: Program, core: &CoreOutput) -> Tensor<2> {
+        self.programmer.argument(reading, program, core)
+    }
+
+    fn device(&self) -> Device {
+        self.programmer.device()
+    }
+}

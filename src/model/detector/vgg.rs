@@ -1,0 +1,78 @@
+//! A detector of VGG16's shape.
+//!
+//! # Source
+//!
+//! Simonyan and Zisserman, "Very Deep Convolutional Networks", configuration D, which the paper names; the width is a
+//! parameter, since a CPU has no week for the full one.
+
+use burn::module::Module;
+use burn::nn::conv::Conv2d;
+use burn::nn::pool::MaxPool2dConfig;
+use burn::nn::{Linear, PaddingConfig2d};
+use burn::tensor::activation::relu;
+use burn::tensor::{Tensor, TensorData};
+use serde::{Deserialize, Serialize};
+
+use crate::model::detector::Detector;
+use crate::model::layers::{Init, Mlp};
+use crate::model::pictures::Pictures;
+
+/// Channels of each block's convolutions at full width, and how many there are.
+const BLOCKS: [(usize, usize); 5] = [(64, 2), (128, 2), (256, 3), (512, 3), (512, 3)];
+/// Features of each of the two layers above them at full width.
+const TOP: usize = 4096;
+
+/// Sizes of the detector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VggDetectorConfig {
+    /// Pixels across and down a picture; the paper's are 224.
+    pub pixels: usize,
+    /// What the widths of VGG16 are divided by: 1 is full width. Default 8.
+    pub narrowed: usize,
+}
+
+/// VGG16's layers.
+#[derive(Module, Debug)]
+pub struct VggDetector {
+    blocks: Vec<Vec<Conv2d>>,
+    top: Mlp,
+    positions: Linear,
+}
+
+impl Detector for VggDetector {
+    type Config = VggDetectorConfig;
+
+    fn new(config: &VggDetectorConfig, n_slots: usize, init: &mut Init) -> Self {
+        let narrowed = config.narrowed.max(1);
+        let (mut channels, mut pixels) = (3, config.pixels);
+        let mut blocks = Vec::new();
+        for (full, n_layers) in BLOCKS {
+            let width = (full / narrowed).max(1);
+            let mut layer = |inputs| init.conv([inputs, width], 3, 1, PaddingConfig2d::Explicit(1, 1, 1, 1));
+            let first = layer(channels);
+            let rest = (1..n_layers).map(|_| layer(width));
+            blocks.push(std::iter::once(first).chain(rest).collect());
+            (channels, pixels) = (width, pixels / 2);
+        }
+        let top = TOP / narrowed;
+        Self {
+            blocks,
+            top: init.mlp(&[channels * pixels * pixels, top, top]),
+            positions: init.linear(top, 3 * n_slots + 1),
+        }
+    }
+
+    fn detect(&self, pictures: &Pictures) -> Tensor<2> {
+        let values: Vec<f32> = pictures.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
+        let shape = [pictures.n, pictures.height, pictures.width, 3];
+        let device = self.positions.weight.device();
+        let rows = Tensor::<4>::from_data(TensorData::new(values, shape), &device);
+        let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
+        let seen = self.blocks.iter().fold(rows.permute([0, 3, 1, 2]), |seen, block| {
+            let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
+            pool.forward(seen)
+        });
+        self.positions.forward(self.top.forward(seen.flatten::<2>(1, 3)))
+    }
+}
