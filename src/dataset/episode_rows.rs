@@ -36,6 +36,8 @@ pub(crate) struct EpisodeRow {
     pub(crate) first_call: i64,
     pub(crate) scopes: FilePlace,
     pub(crate) first_scope: i64,
+    /// What `LeRobot`'s table repeats of this row, but otherwise.
+    pub(crate) copies_problem: Option<String>,
 }
 
 struct MetaBatch {
@@ -47,6 +49,9 @@ struct MetaBatch {
     from: Vec<i64>,
     to: Vec<i64>,
     own: [Vec<i64>; 2],
+    task_id: Vec<String>,
+    split: Vec<String>,
+    success: Vec<bool>,
 }
 
 impl Batch for MetaBatch {
@@ -60,6 +65,9 @@ impl Batch for MetaBatch {
         "dataset_to_index",
         "meta/episodes/chunk_index",
         "meta/episodes/file_index",
+        "ntp/task_id",
+        "ntp/split",
+        "ntp/success",
     ];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
@@ -72,6 +80,21 @@ impl Batch for MetaBatch {
             from: columns.int64("dataset_from_index")?,
             to: columns.int64("dataset_to_index")?,
             own: [columns.int64("meta/episodes/chunk_index")?, columns.int64("meta/episodes/file_index")?],
+            task_id: columns.text("ntp/task_id")?,
+            split: columns.text("ntp/split")?,
+            success: columns.boolean("ntp/success")?,
+        })
+    }
+}
+
+impl MetaBatch {
+    /// What is wrong with the columns that repeat what the episode's own row says.
+    fn copies_problem(&self, at: usize, row: &EpisodeRow) -> Option<String> {
+        let copies = (self.task_id[at].as_str(), self.split[at].as_str(), self.success[at]);
+        let originals = (row.task_id.as_str(), row.split.as_str(), row.is_success);
+        (copies != originals).then(|| {
+            let names = "(ntp/task_id, ntp/split, ntp/success)";
+            format!("{names} are {copies:?}, but {} makes them {originals:?}", layout::EPISODES)
         })
     }
 }
@@ -150,6 +173,7 @@ impl EpisodeRows {
         let found = (meta.episode_index[at], meta.length[at], meta.to[at]);
         let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
         let own = place(meta.own[0][at], meta.own[1][at]);
+        row.copies_problem = meta.copies_problem(at, &row);
         let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
         if found != expected {
             return Err(self.meta.problem(format!(
@@ -244,6 +268,7 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
             first_call: calls[2][at],
             scopes: place(scopes[0][at], scopes[1][at]),
             first_scope: scopes[2][at],
+            copies_problem: None,
         })
     };
     Ok((0..n_rows).filter_map(row).collect())
