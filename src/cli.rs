@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::pipeline::Stage;
+use crate::publish::{Date, License, Release};
 
 /// Neural Task Programming as a dataset pipeline.
 #[derive(Debug, Parser)]
@@ -46,6 +47,10 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
     Query(QueryArgs),
+    /// Make a dataset ready for others: card, Croissant, checksums, under a named licence.
+    Publish(PublishArgs),
+    /// Check a published copy against its SHA256SUMS.
+    Verify(PathArgs),
     /// Print a completion script.
     Completions {
         /// For which shell.
@@ -168,4 +173,35 @@ pub struct QueryArgs {
     /// Write the rows to a Parquet file.
     #[arg(long, value_name = "FILE", requires = "sql")]
     pub parquet: Option<PathBuf>,
+}
+
+/// `ntp publish`.
+#[derive(Debug, Args)]
+pub struct PublishArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The folder to publish it into; the same command carries on what was interrupted.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// Under which licence, by its name on the hub or at SPDX, e.g. cc-by-4.0; there is no default.
+    #[arg(long, value_name = "ID")]
+    pub license: License,
+    /// The day of publication; told, because no clock reaches a file.
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    pub date: Date,
+    /// What it is called [default: NTP demonstrations: FAMILIES].
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Whose it is; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub creator: Vec<String>,
+    /// Where it will be found, e.g. its address at the Hugging Face hub.
+    #[arg(long, value_name = "URL")]
+    pub url: Option<String>,
+    /// Which release it is.
+    #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
+    pub release: Release,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }

@@ -19,6 +19,7 @@ pub mod dataset;
 pub mod expert;
 pub mod model;
 pub mod pipeline;
+pub mod publish;
 pub mod query;
 pub mod recording;
 pub mod report;

@@ -28,7 +28,7 @@ pub use column::{Column, Columns};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
-pub use read::{TableReader, read};
+pub use read::{TableReader, file_columns, read};
 pub use schema::TableSchema;
 pub(crate) use values::Values;
 pub use write::write;
