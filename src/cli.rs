@@ -43,7 +43,7 @@ pub enum Command {
     Inspect(PathArgs),
     /// Check the checksums and the content of a file or folder.
     Validate(PathArgs),
-    /// Show an episode of a recording in Rerun, or simulate it again.
+    /// Show episodes in Rerun, rollouts beside their demonstrations, or simulate them again.
     Replay(ReplayArgs),
     /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
     Query(QueryArgs),
@@ -139,9 +139,9 @@ pub struct PathArgs {
 pub struct ReplayArgs {
     /// A recording (.mcap), or a folder of recordings or rollouts.
     pub path: PathBuf,
-    /// Which episode, by its number.
-    #[arg(long, value_name = "K")]
-    pub episode: u64,
+    /// Which episode, by its number; several with commas.
+    #[arg(long, value_name = "K", value_delimiter = ',', required = true)]
+    pub episode: Vec<u64>,
     /// Write a Rerun file.
     #[arg(long, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "verify"])]
     pub save: Option<PathBuf>,
