@@ -11,13 +11,23 @@ mod dataset;
 #[cfg(test)]
 mod expert;
 #[cfg(test)]
+mod fuzz;
+#[cfg(test)]
+mod kill;
+#[cfg(test)]
 mod kinematic;
+#[cfg(test)]
+mod length;
+#[cfg(test)]
+mod lerobot;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
 mod pipeline;
 #[cfg(test)]
 mod pipeline_suites;
+#[cfg(test)]
+mod publish;
 #[cfg(test)]
 mod query;
 #[cfg(test)]
@@ -42,5 +52,7 @@ mod task;
 mod trace;
 #[cfg(test)]
 mod training;
+#[cfg(test)]
+mod tutorial;
 #[cfg(test)]
 mod visualize;
