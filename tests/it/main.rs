@@ -9,6 +9,8 @@ mod cli;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
+mod dataset_edit;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod fuzz;
@@ -20,6 +22,8 @@ mod kinematic;
 mod length;
 #[cfg(test)]
 mod lerobot;
+#[cfg(test)]
+mod lineage;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
