@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::dataset::{DatasetSummary, summarize};
-use crate::publish::provenance::Provenance;
+use crate::publish::provenance::{Provenance, SourceFacts};
 use crate::publish::tables::{TableFacts, tables};
 use crate::publish::{Publication, PublishError};
 
@@ -35,6 +35,8 @@ pub(super) struct Facts {
     pub(super) limits: Vec<String>,
     /// The command that made it.
     pub(super) command: String,
+    /// The datasets that it was made of, where it was made of datasets.
+    pub(super) sources: Vec<SourceFacts>,
     /// The pipeline file that makes it again.
     pub(super) pipeline: Option<String>,
     pub(super) import_sha256: Option<String>,
@@ -57,6 +59,8 @@ impl Facts {
         let cite_as = citation(publication);
         let left_out = match pipeline {
             Some(_) => Vec::new(),
+            // Its own plan tells of each of them how it was made.
+            None if !provenance.sources().is_empty() => Vec::new(),
             None => vec!["pipeline.toml: the recordings and tasks of the dataset do not lie beside it".to_owned()],
         };
         Ok(Self {
@@ -65,7 +69,8 @@ impl Facts {
             frames_words: frames_words(&summary),
             success_words: success_words(&summary, &provenance),
             limits: limits(&summary),
-            command: command(&provenance, pipeline.is_some()),
+            command: provenance.command(),
+            sources: provenance.sources(),
             import_sha256: provenance.import_sha256().map(ToOwned::to_owned),
             bibtex: format!("{cite_as}\n{PAPER}"),
             cite_as,
@@ -139,17 +144,6 @@ fn limits(summary: &DatasetSummary) -> Vec<String> {
         limits.push("It has no episode of an unseen task: how well a learner generalizes shows elsewhere.".to_owned());
     }
     limits
-}
-
-/// The command that made it, as far as the plans tell.
-fn command(provenance: &Provenance, has_pipeline: bool) -> String {
-    if has_pipeline {
-        return "ntp run pipeline.toml --out RUN --to convert".to_owned();
-    }
-    match &provenance.dataset {
-        Some(plan) => format!("ntp {}", plan.stage),
-        None => "ntp convert".to_owned(),
-    }
 }
 
 /// How the dataset itself is cited.

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::artifact::{ContractError, Manifest, Plan, StageDir};
@@ -19,6 +20,15 @@ pub(super) struct Provenance {
     pub(super) recordings: Option<(Plan, Manifest)>,
     /// How its tasks were drawn.
     pub(super) tasks: Option<Plan>,
+}
+
+/// A dataset that another was made of, as the plan of that one tells.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct SourceFacts {
+    pub(super) name: String,
+    pub(super) version: String,
+    /// Which episodes are from it, half-open.
+    pub(super) episodes: [u64; 2],
 }
 
 impl Provenance {
@@ -47,6 +57,27 @@ impl Provenance {
             "convert": dataset.config.get("convert")?,
         });
         toml::to_string(&toml::Value::try_from(without_nulls(spec)).ok()?).ok()
+    }
+
+    /// The command that made it, as far as the plans tell.
+    pub(super) fn command(&self) -> String {
+        let sources = self.sources();
+        match &self.dataset {
+            Some(_) if self.recordings.is_some() && self.tasks.is_some() => {
+                "ntp run pipeline.toml --out RUN --to convert".to_owned()
+            }
+            Some(plan) if !sources.is_empty() => {
+                let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
+                format!("ntp dataset {} {}", plan.stage, names.join(" "))
+            }
+            _ => "ntp convert PIPELINE.toml".to_owned(),
+        }
+    }
+
+    /// The datasets that it was made of, where it was made of datasets.
+    pub(super) fn sources(&self) -> Vec<SourceFacts> {
+        let sources = self.dataset.as_ref().and_then(|plan| plan.config.get("sources"));
+        sources.and_then(|sources| serde_json::from_value(sources.clone()).ok()).unwrap_or_default()
     }
 
     /// SHA-256 of the task file that tasks were imported from.

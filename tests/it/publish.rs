@@ -242,6 +242,22 @@ fn the_pipeline_of_a_published_dataset_makes_it_again() {
 }
 
 #[test]
+fn a_dataset_made_of_datasets_names_them_on_its_card() {
+    let place = place();
+    let parts = place.dataset.with_file_name("parts");
+    let path = |path: &Path| path.to_string_lossy().into_owned();
+    let (code, _, stderr) = run(&["dataset", "split", &path(&place.dataset), "--by", "split", "--to", &path(&parts)]);
+    assert_eq!(code, 0, "{stderr}");
+    let words = ["--license", "cc0-1.0", "--date", "2026-11-24"];
+    let base = ["publish", &path(&parts.join("unseen")), "--to", &path(&place.to)];
+    let (code, _, stderr) = run(&[&base[..], &words[..]].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let card = text(&place, "README.md");
+    assert!(card.contains("ntp dataset split dataset") && card.contains("| dataset | `"), "{card}");
+    assert!(card.contains("| 0 to 4 |"), "{card}");
+}
+
+#[test]
 fn every_column_of_every_schema_has_its_row_in_the_readme_and_no_other() {
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/parquet/README.md");
     let readme = std::fs::read_to_string(readme).unwrap();
