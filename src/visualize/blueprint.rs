@@ -78,7 +78,7 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     };
     let scope = layout.view("2D", name, "specification", &["/specification/**"])?;
     put_strip_bounds(layout, scope, replays)?;
-    let shares = if paired { [0.4, 0.42, 0.18] } else { [0.56, 0.24, 0.2] };
+    let shares = if paired { [0.34, 0.49, 0.17] } else { [0.56, 0.24, 0.2] };
     layout.split(ContainerKind::Vertical, &[scene, lanes, scope], &shares)
 }
 
