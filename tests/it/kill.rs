@@ -51,6 +51,9 @@ fn attempts(pipeline: &Path, root: &Path) -> Vec<Attempt> {
     };
     let publish = ["publish", &text(&root.join("dataset")), "--to", &text(&root.join("published")), "--license", "mit"];
     let publish = publish.into_iter().chain(["--date", "2026-11-24"]).map(ToOwned::to_owned).collect();
+    let part = |name: &str| text(&root.join("parts").join(name));
+    let merge = ["dataset", "merge", &part("a"), &part("b"), "--to", &text(&root.join("merged"))];
+    let merge = merge.map(ToOwned::to_owned).to_vec();
     vec![
         Attempt { name: "generate", arguments: stage("generate"), needs: &["tasks"], makes: &["recordings"] },
         Attempt { name: "convert", arguments: stage("convert"), needs: &["tasks", "recordings"], makes: &["dataset"] },
@@ -60,6 +63,7 @@ fn attempts(pipeline: &Path, root: &Path) -> Vec<Attempt> {
             needs: &["tasks", "recordings", "dataset"],
             makes: &["published"],
         },
+        Attempt { name: "merge", arguments: merge, needs: &["parts"], makes: &["merged"] },
     ]
 }
 
@@ -76,7 +80,11 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-fn finish(attempt: &Attempt) {
+/// Gives the command again. A merged dataset is there as a whole or not, and is not written again.
+fn finish(attempt: &Attempt, root: &Path) {
+    if attempt.name == "merge" && root.join("merged").exists() {
+        return;
+    }
     let arguments: Vec<&str> = attempt.arguments.iter().map(String::as_str).collect();
     let (code, _, stderr) = run(&arguments);
     assert_eq!(code, 0, "{}: {stderr}", attempt.name);
@@ -101,7 +109,7 @@ fn kill_after(attempt: &Attempt, wait: Duration) -> bool {
 
 #[test]
 fn kills_at_random_moments_lose_double_and_spoil_nothing() {
-    let n_kills = from_environment("NTP_KILLS", 3 * IN_SUITE).div_ceil(3);
+    let n_kills = from_environment("NTP_KILLS", 4 * IN_SUITE).div_ceil(4);
     let folder = tempfile::tempdir().unwrap();
     let pipeline = folder.path().join("kill.toml");
     std::fs::write(&pipeline, PIPELINE).unwrap();
@@ -110,8 +118,13 @@ fn kills_at_random_moments_lose_double_and_spoil_nothing() {
     let (code, _, stderr) = run(&["run", &text(&pipeline), "--to", "tasks", "--out", &text(&whole)]);
     assert_eq!(code, 0, "{stderr}");
     for attempt in attempts(&pipeline, &whole) {
+        if attempt.name == "merge" {
+            let parts = ["--shares", "a=0.5,b=0.5", "--to", &text(&whole.join("parts"))];
+            let (code, _, stderr) = run(&[&["dataset", "split", &text(&whole.join("dataset"))], &parts[..]].concat());
+            assert_eq!(code, 0, "{stderr}");
+        }
         let stopwatch = Stopwatch::start();
-        finish(&attempt);
+        finish(&attempt, &whole);
         moments.push(Duration::from_secs_f64(stopwatch.taken().wall_secs));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(from_environment("NTP_SEED", 1));
@@ -126,7 +139,7 @@ fn kills_at_random_moments_lose_double_and_spoil_nothing() {
             for _ in 0..=kill % 2 {
                 n_running += u64::from(kill_after(attempt, lasts.mul_f64(rng.random_range(0.0..1.0))));
             }
-            finish(attempt);
+            finish(attempt, &root);
             let (expected, found) = (hashes(&whole, attempt.makes), hashes(&root, attempt.makes));
             assert_eq!(found, expected, "{} after kill {kill}", attempt.name);
         }
