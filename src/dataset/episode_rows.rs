@@ -151,7 +151,11 @@ impl EpisodeRows {
     fn read_next(&mut self) -> Result<Option<EpisodeRow>, DatasetError> {
         if self.n_read == self.total {
             self.meta.finish()?;
-            return Ok(None);
+            return match self.reader.next() {
+                None => Ok(None),
+                Some(Err(error)) => Err(error.into()),
+                Some(Ok(_)) => Err(self.problem("its footer does not count this row".to_owned())),
+            };
         }
         while self.batch.as_slice().is_empty() {
             match self.reader.next() {
