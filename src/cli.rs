@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
+use crate::dataset::edit::Ending;
 use crate::pipeline::Stage;
+use crate::program::Program;
+use crate::publish::{Date, License, Release};
+use crate::task::{Family, Split};
 
 /// Neural Task Programming as a dataset pipeline.
 #[derive(Debug, Parser)]
@@ -42,10 +46,19 @@ pub enum Command {
     Inspect(PathArgs),
     /// Check the checksums and the content of a file or folder.
     Validate(PathArgs),
-    /// Show an episode of a recording in Rerun, or simulate it again.
+    /// Show episodes in Rerun, rollouts beside their demonstrations, or simulate them again.
     Replay(ReplayArgs),
     /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
     Query(QueryArgs),
+    /// Say where an episode, a frame or a model comes from.
+    Explain(ExplainArgs),
+    /// Make datasets of datasets, or compare two.
+    #[command(subcommand)]
+    Dataset(DatasetCommand),
+    /// Make a dataset ready for others: card, Croissant, checksums, under a named licence.
+    Publish(PublishArgs),
+    /// Check a published copy against its SHA256SUMS.
+    Verify(PathArgs),
     /// Print a completion script.
     Completions {
         /// For which shell.
@@ -134,9 +147,9 @@ pub struct PathArgs {
 pub struct ReplayArgs {
     /// A recording (.mcap), or a folder of recordings or rollouts.
     pub path: PathBuf,
-    /// Which episode, by its number.
-    #[arg(long, value_name = "K")]
-    pub episode: u64,
+    /// Which episode, by its number; several with commas.
+    #[arg(long, value_name = "K", value_delimiter = ',', required = true)]
+    pub episode: Vec<u64>,
     /// Write a Rerun file.
     #[arg(long, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "verify"])]
     pub save: Option<PathBuf>,
@@ -168,4 +181,153 @@ pub struct QueryArgs {
     /// Write the rows to a Parquet file.
     #[arg(long, value_name = "FILE", requires = "sql")]
     pub parquet: Option<PathBuf>,
+}
+
+/// `ntp publish`.
+#[derive(Debug, Args)]
+pub struct PublishArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The folder to publish it into; the same command carries on what was interrupted.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// Under which licence, by its name on the hub or at SPDX, e.g. cc-by-4.0; there is no default.
+    #[arg(long, value_name = "ID")]
+    pub license: License,
+    /// The day of publication; told, because no clock reaches a file.
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    pub date: Date,
+    /// What it is called [default: NTP demonstrations: FAMILIES].
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Whose it is; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub creator: Vec<String>,
+    /// Where it will be found, e.g. its address at the Hugging Face hub.
+    #[arg(long, value_name = "URL")]
+    pub url: Option<String>,
+    /// Which release it is.
+    #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
+    pub release: Release,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// A dataset, or a model.
+    pub path: PathBuf,
+    /// Which episode of the dataset, by its number.
+    #[arg(long, value_name = "K")]
+    pub episode: Option<u64>,
+    /// Which frame of the episode.
+    #[arg(long, value_name = "F", requires = "episode")]
+    pub frame: Option<u64>,
+    /// A folder in which recordings are looked for, besides `recordings` beside the dataset.
+    #[arg(long, value_name = "DIR")]
+    pub recordings: Vec<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset`.
+#[derive(Debug, Subcommand)]
+pub enum DatasetCommand {
+    /// Write the episodes of several datasets into one, in order.
+    Merge(MergeArgs),
+    /// Write the episodes of a dataset that are as asked for.
+    Filter(FilterArgs),
+    /// Write the parts of a dataset as datasets of their own.
+    Split(SplitArgs),
+    /// Say which episodes, calls and labels differ between two datasets; exit code 1 when any does.
+    Diff(DiffArgs),
+}
+
+/// `ntp dataset merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The datasets.
+    #[arg(value_name = "DATASET", required = true)]
+    pub sources: Vec<PathBuf>,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset filter`. Of an option that is given several times, one value is enough; all options must hold.
+#[derive(Debug, Args)]
+pub struct FilterArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// A task, by its id or its text.
+    #[arg(long, value_name = "TASK")]
+    pub task: Vec<String>,
+    /// A family of tasks.
+    #[arg(long, value_name = "FAMILY")]
+    pub family: Vec<Family>,
+    /// A program that is called.
+    #[arg(long, value_name = "PROGRAM")]
+    pub program: Vec<Program>,
+    /// How it ended: success, failure, or a cause of failure.
+    #[arg(long, value_name = "OUTCOME")]
+    pub outcome: Vec<Ending>,
+    /// Seen or unseen.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Option<Split>,
+    /// Least number of frames.
+    #[arg(long, value_name = "N")]
+    pub min_frames: Option<u64>,
+    /// Greatest number of frames.
+    #[arg(long, value_name = "N")]
+    pub max_frames: Option<u64>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset split`.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("parts").required(true).args(["by", "shares"]))]
+pub struct SplitArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The new folder, with a dataset for each part.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// A part for each value: split, task, family or outcome.
+    #[arg(long, value_name = "WHAT", value_parser = ["split", "task", "family", "outcome"])]
+    pub by: Option<String>,
+    /// Parts drawn at random, e.g. train=0.8,val=0.2.
+    #[arg(long, value_name = "NAME=SHARE,…", value_delimiter = ',')]
+    pub shares: Vec<String>,
+    /// With --shares, what stays together: task (no task is in two parts) or episode.
+    #[arg(long, value_name = "WHAT", value_parser = ["task", "episode"], default_value = "task")]
+    pub unit: String,
+    /// With --shares, the seed of the draw.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset diff`.
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// A dataset.
+    pub before: PathBuf,
+    /// Another one.
+    pub after: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }

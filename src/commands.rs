@@ -2,14 +2,18 @@
 //! stderr.
 
 mod completions;
+mod dataset;
+mod explain;
 mod inspect;
 mod kind;
 mod output;
+mod publish;
 mod query;
 mod replay;
 mod stages;
 mod tasks;
 mod validate;
+mod verify;
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -17,6 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::cli::{Cli, Command};
 use crate::pipeline::{PipelineError, Stage};
+use crate::publish::PublishError;
 
 /// How a command ended when it did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +66,9 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if error.downcast_ref::<UsageError>().is_some() {
         return 2;
     }
+    if matches!(error.downcast_ref(), Some(PublishError::Interrupted)) {
+        return 130;
+    }
     match error.downcast_ref::<PipelineError>() {
         Some(PipelineError::Interrupted) => 130,
         Some(error) if error.is_usage() => 2,
@@ -81,6 +89,10 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Query(args) => query::run(args),
+        Command::Explain(args) => explain::run(args),
+        Command::Dataset(command) => dataset::run(command),
+        Command::Publish(args) => publish::run(args, stop),
+        Command::Verify(args) => verify::run(args),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -17,8 +17,10 @@ pub mod table;
 
 pub mod dataset;
 pub mod expert;
+pub mod lineage;
 pub mod model;
 pub mod pipeline;
+pub mod publish;
 pub mod query;
 pub mod recording;
 pub mod render;

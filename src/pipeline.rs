@@ -14,6 +14,7 @@
 
 mod convert;
 mod costs;
+mod demonstration;
 mod error;
 mod generate;
 mod layout;
@@ -29,6 +30,7 @@ mod train;
 mod trials;
 mod verify;
 
+pub use demonstration::demonstration_of;
 pub use error::PipelineError;
 pub use layout::RunDir;
 pub use resolve::Pipeline;

@@ -12,6 +12,7 @@
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
+//! agreement                         whether a rollout's decisions are the expert's, until the first that is not
 //! specification/…                   which part of the specification each running program may see
 //! probability/{end_of_program, program}/depth_<n>                 what a learned policy thought
 //! observation/<slot>                distance of what each slot shows from the gripper, in metres
@@ -25,6 +26,7 @@
 //!
 //! The same replays give the same bytes: ids come from content, never from a clock.
 
+mod agreement;
 mod blueprint;
 mod calls;
 mod clock;
@@ -44,6 +46,7 @@ use std::path::{Path, PathBuf};
 use rerun::log::ChunkError;
 
 use crate::artifact::IoError;
+use crate::rollout::Divergence;
 use crate::trace::{Actor, Episode};
 use crate::visualize::rrd::RrdFile;
 use crate::visualize::store::Store;
@@ -59,11 +62,13 @@ pub struct Replay<'e> {
     /// The demonstration that a policy was given, to be shown beside its rollout. `None` when it is not at hand; an
     /// expert's episode is its own.
     pub demonstration: Option<&'e Episode>,
+    /// Where a policy first left the expert's decisions; `None` when it never did, and for an expert.
+    pub divergence: Option<Divergence>,
 }
 
 impl<'e> From<&'e Episode> for Replay<'e> {
     fn from(episode: &'e Episode) -> Self {
-        Self { episode, demonstration: None }
+        Self { episode, demonstration: None, divergence: None }
     }
 }
 
@@ -211,17 +216,18 @@ fn each_store(
 }
 
 fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
-    let &Replay { episode, demonstration } = replay;
+    let &Replay { episode, demonstration, divergence } = replay;
     let specification = specification_of(episode, demonstration)?;
     let mut store = Store::recording(&text::recording_id(replay));
-    text::put_properties(&mut store, episode)?;
-    text::put_document(&mut store, episode)?;
+    text::put_properties(&mut store, replay)?;
+    text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
-    calls::put(&mut store, episode)?;
+    calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;
     if let Some(demonstration) = demonstration {
         lanes::put(&mut store, "programs_of_expert", demonstration)?;
+        agreement::put(&mut store, episode, divergence)?;
     }
     specification::put(&mut store, episode, specification.as_ref())?;
     series::put(&mut store, episode)?;

@@ -1,75 +1,155 @@
-//! `ntp replay PATH --episode K`.
+//! `ntp replay PATH --episode K,…`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::artifact::Plan;
 use crate::cli::ReplayArgs;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
-use crate::trace::Episode;
-use crate::visualize;
+use crate::rollout::{Divergence, RolloutRows};
+use crate::task::TaskSet;
+use crate::trace::{Actor, Episode};
+use crate::visualize::{self, Replay};
+
+/// An episode, with what is to be shown beside it.
+struct Found {
+    number: u64,
+    file: PathBuf,
+    plan: Plan,
+    episode: Episode,
+    demonstration: Option<Episode>,
+    divergence: Option<Divergence>,
+}
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
-    let (file, plan, episode) = find(&args.path, args.episode)?;
+    let mut found = find(&args.path, &args.episode)?;
     if args.verify {
-        return verify(args, &plan, &episode);
+        return verify(args, &found);
     }
-    let episodes = [episode];
+    found.iter_mut().try_for_each(add_expert)?;
+    let replays: Vec<Replay<'_>> = found.iter().map(Found::replay).collect();
     let (summary, place) = match &args.save {
-        Some(path) => (visualize::save(&episodes, path)?, path.display().to_string()),
-        None if args.spawn => (visualize::spawn(&episodes)?, "the Rerun viewer".to_owned()),
+        Some(path) => (visualize::save_replays(&replays, path)?, path.display().to_string()),
+        None if args.spawn => (visualize::spawn_replays(&replays)?, "the Rerun viewer".to_owned()),
         None => return Err(UsageError("replay needs one of --save FILE.rrd, --spawn, --verify".to_owned()).into()),
     };
     if args.json {
-        output::print_json(&json!({
-            "recording": file,
-            "episode": args.episode,
-            "frames": summary.frames,
-            "calls": summary.calls,
-            "bytes": summary.bytes,
-            "written": place,
-        }))?;
+        let episodes: Vec<Value> = found.iter().map(Found::to_json).collect();
+        output::print_json(&json!({ "episodes": episodes, "bytes": summary.bytes, "written": place }))?;
     } else {
-        output::print(&format!(
-            "episode {} of {} ({} frames, {} calls) → {place}",
-            args.episode,
-            file.display(),
-            summary.frames,
-            summary.calls
-        ))?;
+        let lines: Vec<String> = found.iter().map(|found| format!("{} → {place}", found.in_words())).collect();
+        output::print(&lines.join("\n"))?;
     }
     Ok(CommandOutcome::Done)
 }
 
-fn verify(args: &ReplayArgs, plan: &Plan, episode: &Episode) -> anyhow::Result<CommandOutcome> {
-    let found = pipeline::verify(plan, episode)?;
-    if args.json {
-        output::print_json(&found)?;
-    } else {
-        output::print(&found.to_string())?;
+fn verify(args: &ReplayArgs, found: &[Found]) -> anyhow::Result<CommandOutcome> {
+    let mut outcome = CommandOutcome::Done;
+    for found in found {
+        let verification = pipeline::verify(&found.plan, &found.episode)?;
+        if args.json {
+            output::print_json(&verification)?;
+        } else {
+            output::print(&verification.to_string())?;
+        }
+        if !matches!(verification, Verification::Same { .. }) {
+            outcome = CommandOutcome::CheckFailed;
+        }
     }
-    Ok(if matches!(found, Verification::Same { .. }) { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+    Ok(outcome)
 }
 
-/// The episode of a number, counted through the recording, or through the recordings of a folder in order of names.
-fn find(path: &Path, episode: u64) -> anyhow::Result<(PathBuf, Plan, Episode)> {
+impl Found {
+    fn replay(&self) -> Replay<'_> {
+        let Self { episode, demonstration, divergence, .. } = self;
+        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence }
+    }
+
+    /// The frame at which a policy first left the expert's decisions, and its time.
+    fn divergent_frame(&self) -> Option<(u32, f64)> {
+        let call = self.episode.calls.get(self.divergence?.call().0 as usize)?;
+        let frame = self.episode.frames.get(call.frames.begin as usize)?;
+        Some((call.frames.begin, frame.time_nanos as f64 / 1e9))
+    }
+
+    fn in_words(&self) -> String {
+        let Self { number, file, episode, demonstration, divergence, .. } = self;
+        let (frames, calls) = (episode.frames.len(), episode.calls.len());
+        let mut words = format!("episode {number} of {} ({frames} frames, {calls} calls", file.display());
+        if demonstration.is_some() {
+            words.push_str(", beside its demonstration");
+        }
+        words.push(')');
+        if let (Some(divergence), Some((frame, secs))) = (divergence, self.divergent_frame()) {
+            words.push_str(&format!("; leaves the expert at {secs:.1} s, frame {frame}: {divergence}"));
+        }
+        words
+    }
+
+    fn to_json(&self) -> Value {
+        let divergence = self.divergence.zip(self.divergent_frame()).map(|(divergence, (frame, secs))| {
+            let (kind, program) = (divergence.kind.name(), divergence.program.name());
+            json!({ "decision": divergence.decision, "kind": kind, "program": program, "frame": frame, "secs": secs })
+        });
+        json!({
+            "recording": self.file,
+            "episode": self.number,
+            "frames": self.episode.frames.len(),
+            "calls": self.episode.calls.len(),
+            "demonstration": self.demonstration.is_some(),
+            "first_divergence": divergence,
+        })
+    }
+}
+
+/// The episodes of some numbers, counted through the recording, or through the recordings of a folder in order of
+/// names.
+fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
     let files = recordings(path)?;
+    let mut found = Vec::new();
     let mut n_episodes = 0;
     for file in &files {
         let mut reader = ShardReader::open(file)?;
-        if episode < n_episodes + reader.n_episodes() {
+        for &number in numbers {
+            if !(n_episodes..n_episodes + reader.n_episodes()).contains(&number) {
+                continue;
+            }
             let plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
-            let found = reader.read_episode(episode - n_episodes)?;
-            return Ok((file.clone(), plan, found));
+            let episode = reader.read_episode(number - n_episodes)?;
+            found.push(Found { number, file: file.clone(), plan, episode, demonstration: None, divergence: None });
         }
         n_episodes += reader.n_episodes();
     }
-    anyhow::bail!("no episode {episode} among the {n_episodes} of {}", path.display())
+    match numbers.iter().find(|&&number| number >= n_episodes) {
+        Some(number) => anyhow::bail!("no episode {number} among the {n_episodes} of {}", path.display()),
+        None => Ok(found),
+    }
+}
+
+/// Adds to a rollout what the folders around its recording tell: the demonstration that it was given, and where it
+/// first left the expert's decisions. A recording that was taken elsewhere is shown by itself.
+fn add_expert(found: &mut Found) -> anyhow::Result<()> {
+    if found.episode.provenance.actor == Actor::Expert {
+        return Ok(());
+    }
+    let file = found.file.canonicalize().with_context(|| format!("failed to find {}", found.file.display()))?;
+    let table = file.ancestors().nth(2).map(|suite| suite.join("rollouts.parquet")).filter(|table| table.is_file());
+    if let Some(table) = table {
+        found.divergence = RolloutRows::read(&table)?.divergence(found.episode.provenance.index);
+    }
+    let tasks = file.ancestors().map(|folder| folder.join("tasks/tasks.json")).find(|tasks| tasks.is_file());
+    if let Some(tasks) = tasks {
+        let demonstration = pipeline::demonstration_of(&found.plan, &TaskSet::read(&tasks)?, &found.episode)?;
+        // A model that reads instructions counts sentences, which have no place on a strip of frames.
+        found.demonstration = demonstration
+            .filter(|shown| shown.boundary_frames().count() == found.episode.specification_frames as usize);
+    }
+    Ok(())
 }
 
 /// A recording itself, or those in a folder: of a stage, of a suite, or the folder that holds the files.

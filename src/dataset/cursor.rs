@@ -105,7 +105,22 @@ impl<B: Batch> OpenFile<B> {
         self.at = if self.row.is_some() { self.at + 1 } else { 0 };
         self.row = Some(self.row.map_or(0, |row| row + 1));
         self.take_batch_if_spent()?;
+        if !self.has_more() {
+            self.check_end()?;
+        }
         Ok(true)
+    }
+
+    /// Makes sure that nothing follows the last row: what is broken there is broken for readers of whole files.
+    fn check_end(&mut self) -> Result<(), DatasetError> {
+        match self.reader.next() {
+            None => Ok(()),
+            Some(Err(error)) => Err(error.into()),
+            Some(Ok(_)) => {
+                let (path, problem) = (self.reader.path().to_owned(), "it has rows that its footer does not count");
+                Err(DatasetError::Count { path, problem: problem.to_owned() })
+            }
+        }
     }
 
     fn has_more(&self) -> bool {

@@ -14,6 +14,8 @@ pub(crate) const SUBTASKS: &str = "meta/subtasks.parquet";
 pub(crate) const NTP_INFO: &str = "ntp/info.json";
 /// Provenance of each episode.
 pub(crate) const EPISODES: &str = "ntp/episodes.parquet";
+/// The card of a published dataset.
+pub(crate) const CARD: &str = "README.md";
 /// Folder of the frames.
 pub(crate) const DATA: &str = "data";
 /// Folder of `LeRobot`'s rows per episode.

@@ -8,7 +8,8 @@ use serde_json::json;
 
 use crate::artifact::{FileEntry, Plan, Receipt};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
-use crate::pipeline::generate::{demonstrate, disturbed, simulation_config, world};
+use crate::pipeline::demonstration::{self, Demonstrations};
+use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
 use crate::pipeline::trials::trial;
@@ -16,14 +17,11 @@ use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
-use crate::seed::Seed;
 use crate::task::{Split, Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
-/// How often the expert may try to demonstrate a task for a suite, each time from other initial positions.
-const DEMONSTRATION_ATTEMPTS: u64 = 20;
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
@@ -154,13 +152,16 @@ impl Learned {
     }
 }
 
+/// What a suite's demonstrations depend on; policies read their boundaries.
+fn demonstrations<'a>(context: &Context<'a>, suite: &'a SuiteSpec) -> Demonstrations<'a> {
+    let spec = &context.pipeline.spec;
+    Demonstrations { seed: spec.seed, suite, simulation: &spec.generate.simulation, frames: RecordedFrames::Boundaries }
+}
+
 /// The tasks that a suite asks for, in its order of sub-tasks.
 fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> Result<Vec<Task>, PipelineError> {
-    let seed = Seed(context.pipeline.spec.seed);
-    let ordered = |task: &Task| match spec.order {
-        OrderSpec::Own => Some(task.clone()),
-        OrderSpec::Shuffled => task.with_towers_shuffled(seed.derive(&format!("order/{}/{}", spec.name, task.id), &[])),
-    };
+    let demonstrations = demonstrations(context, spec);
+    let ordered = |task: &Task| demonstrations.ordered(task);
     let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
     let tasks: Vec<Task> = task_set.of_split(spec.split).filter(is_asked_for).filter_map(ordered).collect();
     if tasks.is_empty() {
@@ -244,22 +245,13 @@ impl Suite<'_> {
         Ok(Start { task, demonstration, world: Box::new(world), eye: None, provenance })
     }
 
-    /// The expert's demonstration of a task, from initial positions that no training demonstration has.
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
         let Self { context, spec, .. } = self;
-        let config = simulation_config(RecordedFrames::Boundaries, &context.pipeline.spec.generate.simulation);
-        for attempt in 0..DEMONSTRATION_ATTEMPTS {
-            let purpose = format!("specification/{}/{attempt}", spec.name);
-            let trial = trial(context.pipeline.spec.seed, &purpose, task, episode, Some(spec.demonstrated()));
-            let demonstration = demonstrate(task, &trial, u64::from(episode), &config)?;
-            if demonstration.outcome.is_success() {
-                return Ok(demonstration);
-            }
-        }
-        Err(PipelineError::NoDemonstration {
+        let found = demonstrations(context, spec).of(task, episode)?;
+        found.ok_or_else(|| PipelineError::NoDemonstration {
             suite: spec.name.clone(),
             task_id: task.id.clone(),
-            attempts: DEMONSTRATION_ATTEMPTS,
+            attempts: demonstration::ATTEMPTS,
         })
     }
 

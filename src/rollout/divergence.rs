@@ -1,5 +1,7 @@
 //! What the expert would decide in an episode, and where a policy first differs.
 
+use std::fmt;
+
 use crate::model::Decisions;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
@@ -45,6 +47,19 @@ pub struct Divergence {
     pub kind: DivergenceKind,
     /// The program that decided.
     pub program: Program,
+}
+
+impl Divergence {
+    /// The call that it made. Each decision makes one, and the root's is nobody's.
+    pub fn call(&self) -> CallId {
+        CallId(self.decision + 1)
+    }
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "decision {} ({} of {})", self.decision, self.kind.name(), self.program)
+    }
 }
 
 /// The calls an expert makes to repeat a demonstration in a scene, without the root's: every sub-task once for each

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::rollout::RolloutEpisode;
+use crate::rollout::{Divergence, DivergenceKind, RolloutEpisode};
 use crate::table::{self, Column, TableError, TableSchema};
 use crate::trace::Push;
 
@@ -76,6 +76,17 @@ impl RolloutRows {
             *causes.entry(cause).or_default() += 1;
         }
         causes
+    }
+
+    /// Where an episode of the suite first left the expert's decisions; `None` when it never did, or is not there.
+    pub fn divergence(&self, episode: u64) -> Option<Divergence> {
+        let row = self.rows.iter().find(|row| u64::try_from(row.episode) == Ok(episode))?;
+        let kind = row.divergence_kind.as_deref()?;
+        Some(Divergence {
+            decision: u32::try_from(row.first_divergence?).ok()?,
+            kind: DivergenceKind::ALL.into_iter().find(|known| known.name() == kind)?,
+            program: row.divergence_program.as_deref()?.parse().ok()?,
+        })
     }
 
     /// Writes the table.

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
 use arrow::datatypes::{ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+};
 use parquet::file::metadata::ParquetMetaData;
 
 use crate::artifact::IoError;
@@ -142,6 +144,21 @@ impl Iterator for TableReader {
             Err(error) => Some(Err(error)),
         }
     }
+}
+
+/// Every column of a file, in order, with what it holds; `None` for a kind that no table of ours has.
+///
+/// # Errors
+///
+/// When the file is not there, or is truncated or corrupted.
+pub fn file_columns(path: &Path) -> Result<Vec<(String, Option<ColumnKind>)>, TableError> {
+    guarded(path, || {
+        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let footer = ArrowReaderMetadata::load(&file, options).map_err(TableError::parquet(path))?;
+        let fields = footer.metadata().file_metadata().schema().get_fields();
+        Ok(fields.iter().map(|field| (field.name().to_owned(), ColumnKind::of(field))).collect())
+    })
 }
 
 /// Positions of the wanted columns among the file's.

@@ -19,7 +19,7 @@ use rerun::log::TimeColumn;
 use rerun::{AsComponents, datatypes};
 
 use crate::visualize::store::Store;
-use crate::visualize::{Replay, VisualizeError, clock, palette, series, specification};
+use crate::visualize::{Replay, VisualizeError, agreement, clock, palette, series, specification};
 
 /// The blueprint for some replays: one for all, since Rerun has one an application.
 pub(super) fn blueprint(replays: &[Replay<'_>]) -> Result<Store, VisualizeError> {
@@ -38,9 +38,22 @@ pub(super) fn blueprint(replays: &[Replay<'_>]) -> Result<Store, VisualizeError>
         .with_timeline(clock::SIM_TIME)
         .with_play_state(PlayState::Paused)
         .with_loop_mode(LoopMode::Off);
+    let time = match divergent(replays) {
+        Some(range) => time.with_time_selection(range),
+        None => time,
+    };
     layout.put("time_panel", &time)?;
     layout.store.activate();
     Ok(layout.store)
+}
+
+/// From the first divergence of a single replay to its end, to be found at once in the time panel.
+fn divergent(replays: &[Replay<'_>]) -> Option<datatypes::AbsoluteTimeRange> {
+    let [replay] = replays else { return None };
+    let frames = &replay.episode.frames;
+    let first = frames.get(agreement::frame_of(replay.episode, replay.divergence?)?)?;
+    let time = |nanos: u64| datatypes::TimeInt(nanos as i64);
+    Some(datatypes::AbsoluteTimeRange { min: time(first.time_nanos), max: time(frames.last()?.time_nanos) })
 }
 
 fn has_predictions(replays: &[Replay<'_>]) -> bool {
@@ -53,7 +66,7 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     put_camera(layout, scene, replays)?;
     let paired = replays.iter().any(|replay| replay.demonstration.is_some());
     let (name, contents): (&str, &[&str]) = if paired {
-        ("Running programs, and those of the demonstration", &["/programs/**", "/programs_of_expert/**"])
+        ("Running programs, and those of the demonstration", &["/agreement", "/programs/**", "/programs_of_expert/**"])
     } else {
         ("Running programs", &["/programs/**"])
     };
@@ -65,7 +78,7 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     };
     let scope = layout.view("2D", name, "specification", &["/specification/**"])?;
     put_strip_bounds(layout, scope, replays)?;
-    let shares = if paired { [0.4, 0.42, 0.18] } else { [0.56, 0.24, 0.2] };
+    let shares = if paired { [0.34, 0.49, 0.17] } else { [0.56, 0.24, 0.2] };
     layout.split(ContainerKind::Vertical, &[scene, lanes, scope], &shares)
 }
 

@@ -5,19 +5,27 @@ use rerun::components::TextLogLevel;
 
 use crate::trace::{CallId, Episode, Outcome, ProgramCall};
 use crate::visualize::store::Store;
-use crate::visualize::{VisualizeError, clock, lanes, palette};
+use crate::visualize::{Replay, VisualizeError, agreement, clock, lanes, palette};
 
 /// Logs a line a call when it is called, and one for the outcome at the last frame.
-pub(super) fn put(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {
+pub(super) fn put(store: &mut Store, replay: &Replay<'_>) -> Result<(), VisualizeError> {
+    let &Replay { episode, divergence, .. } = replay;
     let last = episode.frames.len() - 1;
     let (outcome, level) = match episode.outcome {
         Outcome::Success => ("success".to_owned(), TextLogLevel::INFO),
         Outcome::Failure(cause) => (format!("failure: {}", cause.name()), TextLogLevel::ERROR),
     };
     let positions: Vec<usize> = episode.calls.iter().map(|call| call.frames.begin as usize).chain([last]).collect();
-    let lines = episode.calls.iter().map(|call| path_in_words(episode, call)).chain([outcome]);
-    let levels = episode.calls.iter().map(|_| TextLogLevel::INFO).chain([level]);
-    let colors = episode.calls.iter().map(|call| palette::color(palette::of_call(&episode.scene, call)));
+    let first = |call: &ProgramCall| divergence.filter(|divergence| divergence.call() == call.id);
+    let line = |call| match first(call) {
+        Some(divergence) => format!("{} ({})", path_in_words(episode, call), agreement::words(divergence)),
+        None => path_in_words(episode, call),
+    };
+    let lines = episode.calls.iter().map(line).chain([outcome]);
+    let level_of = |call| if first(call).is_some() { TextLogLevel::WARN } else { TextLogLevel::INFO };
+    let levels = episode.calls.iter().map(level_of).chain([level]);
+    let color_of = |call| if first(call).is_some() { palette::STOP } else { palette::of_call(&episode.scene, call) };
+    let colors = episode.calls.iter().map(|call| palette::color(color_of(call)));
     let log = TextLog::update_fields()
         .with_many_text(lines)
         .with_many_level(levels)

@@ -8,9 +8,10 @@ use rerun::{AnyValues, RecordingInfo, TextDocument};
 use sha2::{Digest as _, Sha256};
 
 use crate::artifact::hex;
+use crate::rollout::Divergence;
 use crate::trace::{Episode, Outcome};
 use crate::visualize::store::Store;
-use crate::visualize::{Replay, VisualizeError, recording_name};
+use crate::visualize::{Replay, VisualizeError, agreement, recording_name};
 
 /// The id of a recording: readable, and other for other content.
 pub(super) fn recording_id(replay: &Replay<'_>) -> String {
@@ -35,9 +36,10 @@ fn hash(hasher: &mut Sha256, episode: &Episode) {
 }
 
 /// Name, provenance and outcome as properties of the recording.
-pub(super) fn put_properties(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {
+pub(super) fn put_properties(store: &mut Store, replay: &Replay<'_>) -> Result<(), VisualizeError> {
+    let episode = replay.episode;
     store.put_static(EntityPath::properties(), &RecordingInfo::new().with_name(recording_name(episode)))?;
-    let words = facts(episode)
+    let words = facts(replay)
         .into_iter()
         .fold(AnyValues::default(), |values, (name, value)| values.with_component::<Text>(name, [value]));
     let sizes = words
@@ -48,17 +50,19 @@ pub(super) fn put_properties(store: &mut Store, episode: &Episode) -> Result<(),
 }
 
 /// The page of text.
-pub(super) fn put_document(store: &mut Store, episode: &Episode) -> Result<(), VisualizeError> {
-    store.put_static("episode", &TextDocument::from_markdown(markdown(episode)))
+pub(super) fn put_document(store: &mut Store, replay: &Replay<'_>) -> Result<(), VisualizeError> {
+    store.put_static("episode", &TextDocument::from_markdown(markdown(replay)))
 }
 
 fn duration_secs(episode: &Episode) -> f64 {
     episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
 }
 
-fn facts(episode: &Episode) -> Vec<(&'static str, String)> {
+fn facts(replay: &Replay<'_>) -> Vec<(&'static str, String)> {
+    let episode = replay.episode;
     let provenance = &episode.provenance;
-    vec![
+    let divergence = replay.divergence.map(|divergence| ("divergence", divergence_in_words(episode, divergence)));
+    let mut facts = vec![
         ("task", provenance.task_id.clone()),
         ("text", provenance.task_text.clone()),
         ("family", provenance.family.name().to_owned()),
@@ -68,10 +72,20 @@ fn facts(episode: &Episode) -> Vec<(&'static str, String)> {
         ("trial", provenance.trial.to_string()),
         ("seed", provenance.seed.to_string()),
         ("episode", provenance.index.to_string()),
-    ]
+    ];
+    facts.extend(divergence);
+    facts
 }
 
-fn markdown(episode: &Episode) -> String {
+/// What, and when.
+fn divergence_in_words(episode: &Episode, divergence: Divergence) -> String {
+    let frame = agreement::frame_of(episode, divergence).and_then(|frame| Some((frame, episode.frames.get(frame)?)));
+    let when = frame.map(|(at, frame)| format!(", at {:.1} s, frame {at}", frame.time_nanos as f64 / 1e9));
+    format!("{}{}", agreement::words(divergence), when.unwrap_or_default())
+}
+
+fn markdown(replay: &Replay<'_>) -> String {
+    let episode = replay.episode;
     let provenance = &episode.provenance;
     let outcome = match episode.outcome {
         Outcome::Success => "**success**".to_owned(),
@@ -93,5 +107,8 @@ fn markdown(episode: &Episode) -> String {
         episode.calls.len(),
         duration_secs(episode)
     );
+    if let Some(divergence) = replay.divergence {
+        let _written = write!(page, "\n**{}**\n", divergence_in_words(episode, divergence));
+    }
     page
 }

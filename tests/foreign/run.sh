@@ -7,7 +7,7 @@ work=$2
 mkdir -p "$work"
 venv="${XDG_CACHE_HOME:-$HOME/.cache}/ntp/foreign-venv"
 if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
-"$venv/bin/pip" install --quiet --disable-pip-version-check mcap mcap-protobuf-support pyarrow pandas polars duckdb rerun-sdk==0.36.3
+"$venv/bin/pip" install --quiet --disable-pip-version-check mcap mcap-protobuf-support pyarrow pandas polars duckdb mlcroissant==1.1.1 datasets rerun-sdk==0.36.3
 
 for recording in "$run"/recordings/*.mcap; do
     "$venv/bin/python" "$here/mcap_reads.py" "$recording"
@@ -18,3 +18,7 @@ cargo run --quiet --release -- replay "$run/recordings" --episode 0 --save "$wor
 "$venv/bin/rerun" rrd verify "$work/episode.rrd"
 "$venv/bin/rerun" rrd stats "$work/episode.rrd" > "$work/stats.txt"
 echo "rerun: accepts episode.rrd"
+cargo run --quiet --release -- publish "$run/dataset" --to "$work/published" --license cc-by-4.0 --date 2026-01-01
+(cd "$work/published" && sha256sum --quiet -c SHA256SUMS)
+"$venv/bin/python" "$here/croissant_reads.py" "$work/published"
+"$venv/bin/python" "$here/configs_read.py" "$work/published"

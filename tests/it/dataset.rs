@@ -64,7 +64,7 @@ pub(crate) fn densify(episode: &Episode, n_between: u32) -> Episode {
     Episode::new(parts).unwrap()
 }
 
-fn failed(episode: &Episode) -> Episode {
+pub(crate) fn failed(episode: &Episode) -> Episode {
     let mut parts = episode.clone().into_parts();
     parts.outcome = Outcome::Failure(Cause::MissedGrasp);
     Episode::new(parts).unwrap()
@@ -352,7 +352,7 @@ fn statistics_are_exact() {
 }
 
 /// Writes a table again after a change of its columns.
-fn rewrite(root: &Path, file: &str, schema: &TableSchema, change: impl FnOnce(&mut Vec<(String, Column)>)) {
+pub(crate) fn rewrite(root: &Path, file: &str, schema: &TableSchema, change: impl FnOnce(&mut Vec<(String, Column)>)) {
     let path = root.join(file);
     let mut columns = table::read(&path, schema).unwrap().into_inner();
     change(&mut columns);
@@ -676,6 +676,58 @@ fn faults_of_whole_files_are_found() {
 }
 
 #[test]
+fn a_file_of_another_dataset_in_the_place_of_its_own_is_found() {
+    let other = tempfile::tempdir().unwrap();
+    let mut turned = episodes();
+    turned.reverse();
+    convert_all(&turned, &ConvertConfig::default(), other.path()).unwrap();
+    let take = |file: &'static str| {
+        let from = other.path().join(file);
+        move |root: &Path| assert!(std::fs::copy(&from, root.join(file)).unwrap() > 0)
+    };
+    let meta = "meta/episodes/chunk-000/file-000.parquet";
+    for (file, code) in
+        [(FIRST_DATA, "frames.row"), (FIRST_CALLS, "calls.row"), (FIRST_SCOPES, "scopes.row"), (meta, "episodes.row")]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+        take(file)(folder.path());
+        let found = validate(folder.path()).findings;
+        let is_named = found.iter().any(|of| of.code == code && of.path == folder.path().join(file));
+        assert!(is_named, "{file}: {found:#?}");
+    }
+}
+
+#[test]
+fn rows_of_two_episodes_that_changed_places_are_found() {
+    let swap = |root: &Path| {
+        rewrite(root, FIRST_DATA, &schema::FRAMES, |columns| {
+            for (_, column) in columns.iter_mut() {
+                // Both episodes have nine frames.
+                match column {
+                    Column::Int64(rows) => (0..9).for_each(|at| rows.swap(at, 9 + at)),
+                    Column::Float32List(rows) => (0..9).for_each(|at| rows.swap(at, 9 + at)),
+                    _ => {}
+                }
+            }
+        });
+    };
+    finding(swap, "frames.row", FIRST_DATA, "index is 9, but should be 0");
+}
+
+#[test]
+fn a_card_without_a_licence_is_found() {
+    let card = |text: &'static str| move |root: &Path| std::fs::write(root.join("README.md"), text).unwrap();
+    for text in ["# A dataset\nlicense: mit\n", "---\nlicense:\n---\n", "---\ntags: []\n---\nlicense: mit\n"] {
+        finding(card(text), "card.license", "README.md", "names no licence");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
+    card("---\nlicense: mit\n---\n# A dataset\n")(folder.path());
+    assert!(validate(folder.path()).is_valid());
+}
+
+#[test]
 fn findings_beyond_the_first_hundred_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     convert_all(&episodes(), &ConvertConfig::default(), folder.path()).unwrap();
@@ -695,8 +747,19 @@ fn every_code_of_a_finding_is_documented_and_no_other() {
     let text: String =
         sources.map(|file| std::fs::read_to_string(root.join("src/dataset").join(file)).unwrap()).collect();
     let is_code = |word: &&str| {
-        let groups =
-            ["calls.", "episodes.", "file.", "frames.", "info.", "meta.", "scopes.", "split.", "stats.", "tasks."];
+        let groups = [
+            "calls.",
+            "card.",
+            "episodes.",
+            "file.",
+            "frames.",
+            "info.",
+            "meta.",
+            "scopes.",
+            "split.",
+            "stats.",
+            "tasks.",
+        ];
         groups.iter().any(|group| word.starts_with(group)) && word.chars().all(|c| c.is_ascii_lowercase() || c == '.')
     };
     let used: BTreeSet<&str> = text.split('"').filter(is_code).collect();

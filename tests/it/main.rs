@@ -9,9 +9,21 @@ mod cli;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
+mod dataset_edit;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
+mod fuzz;
+#[cfg(test)]
+mod kill;
+#[cfg(test)]
 mod kinematic;
+#[cfg(test)]
+mod length;
+#[cfg(test)]
+mod lerobot;
+#[cfg(test)]
+mod lineage;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
@@ -20,6 +32,8 @@ mod painter;
 mod pipeline;
 #[cfg(test)]
 mod pipeline_suites;
+#[cfg(test)]
+mod publish;
 #[cfg(test)]
 mod query;
 #[cfg(test)]
@@ -48,5 +62,7 @@ mod task;
 mod trace;
 #[cfg(test)]
 mod training;
+#[cfg(test)]
+mod tutorial;
 #[cfg(test)]
 mod visualize;

@@ -127,3 +127,34 @@ fn settings_of_suites_out_of_range_are_refused_by_key() {
     let sorting = PIPELINE.replace("block_stacking", "object_sorting").replace("import = ", "# import = ");
     check_refused(&sorting, 8, 2, &["rollout.suites[1].order", "object_sorting builds no towers", "block_stacking"]);
 }
+
+#[test]
+fn rollouts_are_replayed_beside_the_demonstrations_that_they_were_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, rrd) = (folder.path().join("run"), folder.path().join("rollouts.rrd"));
+    let (out, rrd) = (out.to_string_lossy(), rrd.to_string_lossy());
+    let (code, _, stderr) = ntp(&["run", "pipelines/smoke.toml", "--out", &out]);
+    assert_eq!(code, 0, "{stderr}");
+    let replay = |actor: &str| {
+        let path = format!("{out}/rollouts/{actor}/stacking_unseen");
+        let (code, stdout, stderr) = ntp(&["replay", &path, "--episode", "1,0", "--save", &rrd, "--json"]);
+        assert_eq!(code, 0, "{stderr}");
+        serde_json::from_str::<serde_json::Value>(&stdout).unwrap()["episodes"].as_array().unwrap().clone()
+    };
+    for episode in replay("oracle") {
+        assert_eq!(episode["demonstration"], true);
+        assert_eq!(episode["first_divergence"], serde_json::Value::Null);
+    }
+    let sql =
+        "SELECT episode, first_divergence, divergence_kind FROM rollouts WHERE variant = 'ntp' ORDER BY episode DESC";
+    let (_, rows, _) = ntp(&["query", &out, sql, "--json"]);
+    let rows: serde_json::Value = serde_json::from_str(&rows).unwrap();
+    let told = replay("ntp-seed0-mss");
+    assert_eq!(told.len(), 2);
+    for (row, episode) in rows.as_array().unwrap()[2..].iter().zip(told) {
+        assert_eq!(episode["demonstration"], true);
+        assert_eq!(episode["episode"], row["episode"]);
+        assert_eq!(episode["first_divergence"]["decision"], row["first_divergence"]);
+        assert_eq!(episode["first_divergence"]["kind"], row["divergence_kind"]);
+    }
+}

@@ -300,7 +300,7 @@ fn a_set_made_in_memory_keeps_the_same_rules() {
 }
 
 /// A file in the authors' form, with three tasks of 8 cubes.
-fn authors_file() -> Value {
+pub(crate) fn authors_file() -> Value {
     let task = |id: &str, pairs: &[(u8, u8)]| {
         let cubes = |(source, target): &(u8, u8)| (format!("cube_{source}"), format!("cube_{target}"));
         let goal = |(src, target): (String, String)| json!({"name": "pick_place", "src": src, "target": target});

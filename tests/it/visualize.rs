@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use ntp::model::Decisions;
 use ntp::program::Program;
-use ntp::rollout::{Decision, Expectation, Limits, Oracle, Policy, Query, Start, run};
+use ntp::rollout::{Decision, Divergence, DivergenceKind, Expectation, Limits, Oracle, Policy, Query, Start, run};
 use ntp::task::{Split, Task};
 use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Span};
 use ntp::visualize::{Replay, VisualizeError, save, save_replays};
@@ -176,7 +176,7 @@ fn replays_of_a_tower() -> (Episode, Episode, Episode) {
 #[test]
 fn a_recording_has_scene_programs_scopes_and_words_on_two_timelines() {
     let (_, shown, acted) = replays_of_a_tower();
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown) }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
     let chunks = read.only();
     let found = entities(chunks);
     let bodies = acted.scene.bodies.iter().map(|body| format!("/world/bodies/{}", body.name));
@@ -265,9 +265,52 @@ fn check_lanes(chunks: &[Chunk], root: &str, episode: &Episode) {
 fn each_calls_lane_begins_and_ends_at_its_frames() {
     let (expert, shown, acted) = replays_of_a_tower();
     check_lanes(read_back(&[Replay::from(&expert)]).only(), "programs", &expert);
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown) }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
     check_lanes(read.only(), "programs", &acted);
     check_lanes(read.only(), "programs_of_expert", &shown);
+}
+
+#[test]
+fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
+    let (_, shown, acted) = replays_of_a_tower();
+    let divergence = Divergence { decision: 6, kind: DivergenceKind::Argument, program: Program::Pick };
+    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence) };
+    let read = read_back(&[replay]);
+    let frame = i64::from(acted.calls[7].frames.begin);
+    assert!(frame > 0);
+    let words = "first divergence: argument of pick, decision 6";
+    assert_eq!(lane(read.only(), "/agreement"), [(0, "as the expert".to_owned()), (frame, words.to_owned())]);
+    let log = temporal(read.only(), "/calls");
+    let lines = log.iter_slices::<String>(rerun::TextLog::descriptor_text().component);
+    let told: Vec<usize> = lines.enumerate().filter(|(_, row)| row[0].contains(words)).map(|(at, _)| at).collect();
+    assert_eq!(told, [7]);
+    let agreed = read_back(&[Replay { divergence: None, ..replay }]);
+    assert_eq!(lane(agreed.only(), "/agreement"), [(0, "as the expert".to_owned())]);
+}
+
+#[test]
+fn the_layout_for_foxglove_names_topics_and_fields_that_recordings_have() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let layout = std::fs::read_to_string(root.join("data/foxglove_layout.json")).unwrap();
+    let layout: serde_json::Value = serde_json::from_str(&layout).unwrap();
+    let topics = std::fs::read_to_string(root.join("schemas/mcap/README.md")).unwrap();
+    let messages = ["program_stack", "program_call", "observation"]
+        .map(|name| std::fs::read_to_string(root.join(format!("schemas/mcap/ntp/v1/{name}.proto"))).unwrap());
+    let mut waiting = vec![&layout];
+    let mut n_paths = 0;
+    while let Some(value) = waiting.pop() {
+        waiting.extend(value.as_array().into_iter().flatten());
+        waiting.extend(value.as_object().into_iter().flat_map(|map| map.values()));
+        let Some(path) = value.as_str().filter(|text| text.starts_with('/')) else { continue };
+        let mut parts = path.split('.');
+        let topic = parts.next().unwrap();
+        assert!(topics.contains(&format!("| `{topic}` |")), "{topic}");
+        for field in parts {
+            assert!(messages.iter().any(|message| message.contains(&format!(" {field} = "))), "{path}");
+        }
+        n_paths += 1;
+    }
+    assert!(n_paths > 8);
 }
 
 /// Where the bars of a strip begin and end, as shares of the specification.
@@ -290,7 +333,7 @@ fn bars(chunks: &[Chunk], entity: &str) -> Vec<Option<(f32, f32)>> {
 fn scopes_are_the_output_spans_on_the_boundary_frames_of_the_specification() {
     let (expert, shown, acted) = replays_of_a_tower();
     for (episode, demonstration) in [(&expert, None), (&acted, Some(&shown))] {
-        let read = read_back(&[Replay { episode, demonstration }]);
+        let read = read_back(&[Replay { episode, demonstration, divergence: None }]);
         let spans = if demonstration.is_none() { episode.clone().boundaries_only() } else { episode.clone() };
         for depth in 0..3_u8 {
             let entity = format!("/specification/scope/depth_{depth}");
@@ -322,7 +365,7 @@ fn probabilities_are_those_of_the_decisions() {
 #[test]
 fn the_same_replays_give_the_same_bytes() {
     let (expert, shown, acted) = replays_of_a_tower();
-    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown) }];
+    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None }];
     let (first, second) = (read_back(&replays), read_back(&replays));
     let (first, second) = (std::fs::read(&first.path).unwrap(), std::fs::read(&second.path).unwrap());
     let first_difference = first.iter().zip(&second).position(|(a, b)| a != b);
@@ -444,7 +487,7 @@ fn a_demonstration_of_another_length_is_refused_by_number() {
     let foreign = demonstration(&other, &trial(&other, 0, 1), 3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("episode.rrd");
-    let replays = [Replay { episode: &acted, demonstration: Some(&foreign) }];
+    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None }];
     let error = save_replays(&replays, &path).unwrap_err();
     let expected = "episode 42 was given a specification of 13 frames, but the demonstration to show beside it \
                     (episode 3) has 5 boundary frames";

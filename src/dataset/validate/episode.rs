@@ -43,6 +43,9 @@ impl EpisodeCheck {
         for problem in self.leaks(row) {
             validation.error("split.leak", path, place(), problem);
         }
+        if let Some(problem) = &row.copies_problem {
+            validation.error("episodes.value", path, place(), problem.clone());
+        }
         self.data_places.insert(row.data);
     }
 

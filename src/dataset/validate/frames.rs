@@ -69,8 +69,8 @@ impl Batch for FullFrameBatch {
 
 /// What the row before said that the next one must fit.
 struct Before {
-    action: Vec<f32>,
-    gripper: Vec<f32>,
+    action: [f32; ACTION_NAMES.len()],
+    gripper: [f32; 3],
     time_secs: f64,
     recording_frame: i64,
 }
@@ -85,8 +85,7 @@ pub(super) struct FrameCheck {
 
 impl FrameCheck {
     pub(super) fn new(n_slots: usize, fps: u32) -> Self {
-        let width = Observation::width(n_slots);
-        Self { width, fps: fps.max(1), range: vec![(f32::INFINITY, f32::NEG_INFINITY); width] }
+        Self { width: Observation::width(n_slots), fps: fps.max(1), range: Vec::new() }
     }
 
     /// Checks the frames of an episode. Labels are checked when its calls are there.
@@ -98,7 +97,7 @@ impl FrameCheck {
         texts: &Texts,
         validation: &mut Validation,
     ) -> Result<(), DatasetError> {
-        let labels = calls.map(|calls| labels(calls, row.n_frames));
+        let mut labels = calls.map(Labels::new);
         let mut before: Option<Before> = None;
         for frame in 0..row.n_frames {
             let (batch, at) = cursor.next(row.data)?;
@@ -109,11 +108,10 @@ impl FrameCheck {
             self.widen(&batch.base.state[at]);
             let mut problems = self.row_problems(batch, at, row, frame, texts);
             problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
-            let label = labels.as_ref().and_then(|labels| labels.get(frame as usize));
-            problems.extend(label.and_then(|label| label_problem(label, batch, at)));
+            problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
             before = Some(Before {
-                action: batch.action[at].clone(),
-                gripper: batch.gripper[at].clone(),
+                action: first(&batch.action[at]),
+                gripper: first(&batch.gripper[at]),
                 time_secs: batch.time_secs[at],
                 recording_frame: batch.recording_frame[at],
             });
@@ -126,6 +124,7 @@ impl FrameCheck {
     }
 
     fn widen(&mut self, state: &[f32]) {
+        self.range.resize(state.len(), (f32::INFINITY, f32::NEG_INFINITY));
         for ((min, max), value) in self.range.iter_mut().zip(state) {
             *min = min.min(*value);
             *max = max.max(*value);
@@ -194,43 +193,60 @@ fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&
             format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
         ));
     }
-    let moved = batch.gripper[at].iter().zip(&before.gripper).map(|(here, there)| here - there);
-    let closed = batch.base.state[at].last().copied();
-    let expected: Vec<f32> = moved.chain(closed).collect();
+    let [x, y, z] = first(&batch.gripper[at]);
+    let [from_x, from_y, from_z] = before.gripper;
+    let closed = batch.base.state[at].last().copied().unwrap_or(f32::NAN);
+    let expected = [x - from_x, y - from_y, z - from_z, closed];
     (before.action != expected).then(|| {
         ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
     })
 }
 
-/// The deepest call that goes on from a frame, and its path.
-struct Label {
-    call_id: i64,
-    path: String,
+/// The first values of a vector; nothing but itself equals what is not there.
+fn first<const N: usize>(values: &[f32]) -> [f32; N] {
+    std::array::from_fn(|at| values.get(at).copied().unwrap_or(f32::NAN))
 }
 
-/// The labels that frames should have, as the writer derives them.
-fn labels(calls: &[ProgramCall], n_frames: i64) -> Vec<Label> {
-    let n_frames = usize::try_from(n_frames).unwrap_or(0);
-    let mut running = vec![0; n_frames];
-    let mut paths: Vec<String> = Vec::new();
-    for (position, call) in calls.iter().enumerate() {
-        let caller = call.caller.and_then(|caller| paths.get(caller.0 as usize));
-        let path = caller.map_or_else(|| call.program.to_string(), |caller| format!("{caller}/{}", call.program));
-        paths.push(path);
-        let rows = call.frames.begin as usize..call.frames.last() as usize;
-        if call.depth > 0 && rows.end <= n_frames && !rows.is_empty() {
-            running[rows].fill(position);
+/// The labels that frames should have, in their order.
+struct Labels<'c> {
+    calls: &'c [ProgramCall],
+    /// Stacks of running programs, as texts.
+    paths: Vec<String>,
+    /// The calls that go on, by position; the root is always there.
+    running: Vec<usize>,
+    /// Position of the next call that has not begun.
+    next: usize,
+}
+
+impl<'c> Labels<'c> {
+    fn new(calls: &'c [ProgramCall]) -> Self {
+        let mut paths: Vec<String> = Vec::with_capacity(calls.len());
+        for call in calls {
+            let caller = call.caller.and_then(|caller| paths.get(caller.0 as usize));
+            let name = call.program.name();
+            let path = caller.map_or_else(|| name.to_owned(), |caller| [caller.as_str(), "/", name].concat());
+            paths.push(path);
         }
+        Self { calls, paths, running: Vec::new(), next: 1 }
     }
-    running
-        .into_iter()
-        .map(|call| Label { call_id: call as i64, path: paths.get(call).cloned().unwrap_or_default() })
-        .collect()
+
+    /// The deepest call that goes on from a frame, and its path. Frames are asked for in order.
+    fn at(&mut self, frame: i64) -> (i64, &str) {
+        let has_ended = |&call: &usize| i64::from(self.calls[call].frames.last()) <= frame;
+        while self.running.pop_if(|call| has_ended(call)).is_some() {}
+        while let Some(call) = self.calls.get(self.next).filter(|call| i64::from(call.frames.begin) <= frame) {
+            if i64::from(call.frames.last()) > frame {
+                self.running.push(self.next);
+            }
+            self.next += 1;
+        }
+        let deepest = self.running.last().copied().unwrap_or(0);
+        (deepest as i64, self.paths.get(deepest).map_or("", String::as_str))
+    }
 }
 
-fn label_problem(label: &Label, batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
+fn label_problem(expected: (i64, &str), batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
     let found = (batch.call_id[at], batch.program[at].as_str());
-    let expected = (label.call_id, label.path.as_str());
     (found != expected).then(|| {
         ("frames.label", format!("(ntp.call_id, ntp.program) are {found:?}, but the calls make them {expected:?}"))
     })

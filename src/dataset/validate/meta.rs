@@ -9,10 +9,10 @@ use crate::dataset::feature::{FEATURES, Feature};
 use crate::dataset::finding::Validation;
 use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::layout::{self, FilePlace};
-use crate::dataset::schema::{FRAMES, SUBTASKS, TASKS};
+use crate::dataset::schema::{FRAMES, META_EPISODES, SUBTASKS, TASKS};
 use crate::dataset::statistics::FeatureStatistics;
 use crate::program::vocabulary_hash;
-use crate::table::{self, TableReader};
+use crate::table::{self, Columns, TableError, TableReader};
 
 /// Texts that frames refer to, and the range that observations should have. Empty where they could not be read.
 #[derive(Default)]
@@ -60,8 +60,26 @@ pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
         check_info(root, &info, &texts, validation);
         texts.state_range = check_statistics(root, &info, validation);
     }
+    if let Err(error) = check_episode_statistics(root, validation) {
+        validation.failed("episodes.row", &error);
+    }
     check_ntp_info(root, validation);
+    check_card(root, validation);
     texts
+}
+
+/// A dataset that was published has a card, and nobody may use what has no licence.
+fn check_card(root: &Path, validation: &mut Validation) {
+    let path = root.join(layout::CARD);
+    let Ok(card) = std::fs::read(&path) else { return };
+    let card = String::from_utf8_lossy(&card);
+    let mut lines = card.lines();
+    let is_yaml = lines.next() == Some("---");
+    let mut fields = lines.take_while(|line| is_yaml && *line != "---").filter_map(|line| line.split_once(':'));
+    if !fields.any(|(key, value)| key == "license" && !value.trim().is_empty()) {
+        let message = "the card names no licence: `license: ID` is missing from its head".to_owned();
+        validation.error("card.license", &path, String::new(), message);
+    }
 }
 
 fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validation) {
@@ -170,6 +188,65 @@ fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Op
         }
     }
     stats.get("observation.state").map(|state| (state.min.clone(), state.max.clone()))
+}
+
+/// Checks the statistics of each episode in `meta/episodes/`: as many values as frames, all in order. What is wrong
+/// with the numbers of rows is found when episodes are read.
+fn check_episode_statistics(root: &Path, validation: &mut Validation) -> Result<(), DatasetError> {
+    let columns = META_EPISODES.columns()?;
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let features = names.iter().filter_map(|name| name.strip_prefix("stats/")?.strip_suffix("/count"));
+    let features: Vec<&str> = features.collect();
+    let mut place = FilePlace::default();
+    let mut n_episodes = 0;
+    loop {
+        let path = place.in_dataset(root, layout::META_EPISODES);
+        if n_episodes > 0 && !path.exists() {
+            return Ok(());
+        }
+        for batch in TableReader::open_columns(&path, &META_EPISODES, &names)? {
+            let mut batch = batch?;
+            let lengths = batch.int64("length")?;
+            for feature in &features {
+                let problems = episode_statistics_problems(&mut batch, feature, &lengths)?;
+                for (row, problem) in problems {
+                    let place = format!("episode {}, stats/{feature}", n_episodes + row);
+                    validation.error("stats.value", &path, place, problem);
+                }
+            }
+            n_episodes += lengths.len();
+        }
+        place = place.next();
+    }
+}
+
+/// What is wrong with the statistics of one feature, by row of the batch.
+fn episode_statistics_problems(
+    batch: &mut Columns,
+    feature: &str,
+    lengths: &[i64],
+) -> Result<Vec<(usize, String)>, TableError> {
+    let count = batch.int64_list(&format!("stats/{feature}/count"))?;
+    let mut list = |name: &str| batch.float64_list(&format!("stats/{feature}/{name}"));
+    let (min, mean, max, std) = (list("min")?, list("mean")?, list("max")?, list("std")?);
+    let mut problems = Vec::new();
+    for row in 0..lengths.len() {
+        if count[row] != [lengths[row]] {
+            problems.push((row, format!("count is {:?}, but the episode has {} frames", count[row], lengths[row])));
+        }
+        let (min, mean, max, std) = (&min[row], &mean[row], &max[row], &std[row]);
+        let is_ordered = [mean.len(), max.len(), std.len()] == [min.len(); 3]
+            && (0..min.len()).all(|at| in_order(&[min[at], mean[at], max[at]]) && std[at] >= 0.0);
+        if !is_ordered {
+            problems.push((row, "minimum, mean and maximum are not in order, or of other lengths".to_owned()));
+        }
+    }
+    Ok(problems)
+}
+
+/// Whether numbers grow, but for what rounding does to a mean.
+fn in_order(numbers: &[f64]) -> bool {
+    numbers.windows(2).all(|pair| pair[0] <= pair[1] + 1e-9 * pair[1].abs().max(1.0))
 }
 
 fn statistics_problem(statistics: &FeatureStatistics, feature: &Feature, info: &Info) -> Option<String> {

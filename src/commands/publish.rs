@@ -1,0 +1,58 @@
+//! `ntp publish DATASET --to DIR --license ID --date DAY`.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::cli::PublishArgs;
+use crate::commands::kind::Kind;
+use crate::commands::{CommandOutcome, UsageError, output};
+use crate::dataset::summarize;
+use crate::publish::{Publication, publish};
+
+pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
+    let kind = Kind::of(&args.dataset)?;
+    if kind != Kind::Dataset {
+        let problem = format!("{} is a {}; only datasets are published", args.dataset.display(), kind.name());
+        return Err(UsageError(problem).into());
+    }
+    let publication = publication(args)?;
+    let summary = publish(&args.dataset, &args.to, &publication, || !stop.load(Ordering::Relaxed))?;
+    if args.json {
+        output::print_json(&summary)?;
+    } else {
+        output::print(&format!(
+            "{} files, {} bytes, {} → {} ({} written, {} there already)",
+            summary.files,
+            summary.bytes,
+            publication.license.spdx,
+            args.to.display(),
+            summary.copied,
+            summary.kept
+        ))?;
+        output::note(&format!("to the Hugging Face hub: sh {}/upload.sh OWNER/NAME", args.to.display()));
+    }
+    if summary.warnings > 0 {
+        output::note(&format!("{} warnings: ntp validate {}", summary.warnings, args.dataset.display()));
+    }
+    summary.left_out.iter().for_each(|left_out| output::note(&format!("left out: {left_out}")));
+    Ok(if summary.left_out.is_empty() { CommandOutcome::Done } else { CommandOutcome::LeftOut })
+}
+
+fn publication(args: &PublishArgs) -> anyhow::Result<Publication> {
+    let name = match &args.name {
+        Some(name) => name.trim().to_owned(),
+        None => format!("NTP demonstrations: {}", summarize(&args.dataset)?.families.join(", ").replace('_', " ")),
+    };
+    let texts = args.creator.iter().chain(&args.url).chain([&name]);
+    if let Some(text) = texts.into_iter().find(|text| text.is_empty() || text.chars().any(char::is_control)) {
+        return Err(UsageError(format!("{text:?} is no name: it is empty or of more than one line")).into());
+    }
+    Ok(Publication {
+        license: args.license,
+        date: args.date,
+        name,
+        creators: args.creator.clone(),
+        url: args.url.clone(),
+        release: args.release,
+    })
+}

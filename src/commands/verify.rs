@@ -1,0 +1,27 @@
+//! `ntp verify DIR`: a published copy against its `SHA256SUMS`.
+
+use anyhow::anyhow;
+
+use crate::cli::PathArgs;
+use crate::commands::{CommandOutcome, output};
+use crate::publish::verify;
+
+pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
+    let verified = verify(&args.path).map_err(|error| anyhow!("{error}; is it a published folder?"))?;
+    if args.json {
+        output::print_json(&verified)?;
+    } else {
+        let mut lines: Vec<String> = Vec::new();
+        for found in &verified.differences {
+            let detail = if found.detail.is_empty() { String::new() } else { format!(": {}", found.detail) };
+            lines.push(format!("{:10}  {}{detail}", found.difference.name(), found.path));
+        }
+        let n_differences = verified.differences.len();
+        lines.push(match n_differences {
+            0 => format!("all {} files are as they were published", verified.files),
+            _ => format!("{n_differences} differences among {} files", verified.files),
+        });
+        output::print(&lines.join("\n"))?;
+    }
+    Ok(if verified.differences.is_empty() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}

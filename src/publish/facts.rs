@@ -1,0 +1,179 @@
+//! What card and metadata say of a dataset, gathered from its files.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::dataset::{DatasetSummary, summarize};
+use crate::publish::provenance::{Provenance, SourceFacts};
+use crate::publish::tables::{TableFacts, tables};
+use crate::publish::{Publication, PublishError};
+
+/// The paper whose method the dataset is for.
+const PAPER: &str = "\
+@inproceedings{xu2018neural,
+  title         = {Neural Task Programming: Learning to Generalize Across Hierarchical Tasks},
+  author        = {Xu, Danfei and Nair, Suraj and Zhu, Yuke and Gao, Julian and Garg, Animesh and Fei-Fei, Li and Savarese, Silvio},
+  booktitle     = {IEEE International Conference on Robotics and Automation},
+  year          = {2018},
+  eprint        = {1710.01813},
+  archivePrefix = {arXiv}
+}
+";
+
+/// What card and metadata say of a dataset.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Facts {
+    pub(super) summary: DatasetSummary,
+    pub(super) tables: Vec<TableFacts>,
+    /// One sentence or two on what it is.
+    pub(super) description: String,
+    /// Which frames are rows, in words.
+    pub(super) frames_words: &'static str,
+    /// How often whoever acted succeeded, in words.
+    pub(super) success_words: String,
+    pub(super) limits: Vec<String>,
+    /// The command that made it.
+    pub(super) command: String,
+    /// The datasets that it was made of, where it was made of datasets.
+    pub(super) sources: Vec<SourceFacts>,
+    /// The pipeline file that makes it again.
+    pub(super) pipeline: Option<String>,
+    pub(super) import_sha256: Option<String>,
+    pub(super) bibtex: String,
+    pub(super) cite_as: String,
+    /// Documents that tell where it comes from, by name.
+    #[serde(skip)]
+    pub(super) provenance_files: Vec<(String, Vec<u8>)>,
+    /// What was not at hand.
+    #[serde(skip)]
+    pub(super) left_out: Vec<String>,
+}
+
+impl Facts {
+    /// Gathers all of it.
+    pub(super) fn gather(dataset: &Path, publication: &Publication) -> Result<Self, PublishError> {
+        let summary = summarize(dataset)?;
+        let provenance = Provenance::of(dataset)?;
+        let pipeline = provenance.pipeline(&publication.slug());
+        let cite_as = citation(publication);
+        let left_out = match pipeline {
+            Some(_) => Vec::new(),
+            // Its own plan tells of each of them how it was made.
+            None if !provenance.sources().is_empty() => Vec::new(),
+            None => vec!["pipeline.toml: the recordings and tasks of the dataset do not lie beside it".to_owned()],
+        };
+        Ok(Self {
+            tables: tables(dataset, &summary)?,
+            description: description(&summary),
+            frames_words: frames_words(&summary),
+            success_words: success_words(&summary, &provenance),
+            limits: limits(&summary),
+            command: provenance.command(),
+            sources: provenance.sources(),
+            import_sha256: provenance.import_sha256().map(ToOwned::to_owned),
+            bibtex: format!("{cite_as}\n{PAPER}"),
+            cite_as,
+            provenance_files: provenance_files(&provenance, pipeline.as_deref()),
+            pipeline,
+            left_out,
+            summary,
+        })
+    }
+}
+
+fn families(summary: &DatasetSummary) -> String {
+    summary.families.iter().map(|family| family.replace('_', " ")).collect::<Vec<_>>().join(", ")
+}
+
+fn description(summary: &DatasetSummary) -> String {
+    let actors: Vec<String> = summary.actors.iter().map(|(actor, episodes)| format!("{episodes} by {actor}")).collect();
+    format!(
+        "{} simulated robot episodes ({}) of {} tasks of {}, with the hierarchy of programs that acted them: true \
+         labels of every program call, its arguments, and the part of the demonstration it was given.",
+        summary.total_episodes,
+        actors.join(", "),
+        summary.total_tasks,
+        families(summary)
+    )
+}
+
+fn frames_words(summary: &DatasetSummary) -> &'static str {
+    if summary.frames == "boundaries" {
+        "one at the end of each primitive, and the first"
+    } else {
+        "every recorded one"
+    }
+}
+
+fn success_words(summary: &DatasetSummary, provenance: &Provenance) -> String {
+    let share = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
+    let successes = summary.outcomes.get("success").copied().unwrap_or(0);
+    let all = summary.total_episodes + summary.failed_left_out;
+    let mut words = format!("{successes} of {all} episodes succeeded ({:.1} %).", share(successes, all));
+    if let Some((episodes, failed)) = provenance.demonstrated().filter(|(episodes, _)| *episodes == all) {
+        words.push_str(&format!(" The recordings say the same: {failed} of {episodes} failed in physics."));
+    }
+    words
+}
+
+fn limits(summary: &DatasetSummary) -> Vec<String> {
+    let mut limits = vec![
+        "Simulated: rigid bodies, a gripper without an arm, known poses. Nothing of it was measured on a robot."
+            .to_owned(),
+        format!(
+            "`timestamp` is regular at {} frames a second, as LeRobot wants; the simulation's own time is \
+             `ntp.time_secs`.",
+            summary.fps
+        ),
+        "Observations are positions of slots, relative to the gripper.".to_owned(),
+    ];
+    if summary.frames == "boundaries" {
+        limits.push(
+            "Frames between the ends of primitives are not in the tables: motions have no intermediate states."
+                .to_owned(),
+        );
+    }
+    if summary.failed_left_out > 0 {
+        limits.push(format!(
+            "{} episodes that failed were left out: what is here is better than what acted.",
+            summary.failed_left_out
+        ));
+    }
+    if !summary.splits.contains_key("unseen") {
+        limits.push("It has no episode of an unseen task: how well a learner generalizes shows elsewhere.".to_owned());
+    }
+    limits
+}
+
+/// How the dataset itself is cited.
+fn citation(publication: &Publication) -> String {
+    let url = publication.url.as_ref().map(|url| format!("\n  url     = {{{url}}},")).unwrap_or_default();
+    format!(
+        "@misc{{{},\n  title   = {{{}}},\n  author  = {{{}}},\n  year    = {{{}}},{url}\n  note    = {{Release {}, made \
+         with ntp {}: Neural Task Programming as a dataset pipeline}}\n}}\n",
+        publication.slug(),
+        publication.name,
+        publication.creators().collect::<Vec<_>>().join(" and "),
+        publication.date.year(),
+        publication.release,
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+/// The pipeline file, and the plans it is made of.
+fn provenance_files(provenance: &Provenance, pipeline: Option<&str>) -> Vec<(String, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut add = |name: &str, value: serde_json::Result<Vec<u8>>| {
+        files.extend(value.ok().map(|text| (format!("provenance/{name}.json"), text)));
+    };
+    if let Some(plan) = &provenance.tasks {
+        add("tasks_plan", serde_json::to_vec_pretty(plan));
+    }
+    if let Some((plan, manifest)) = &provenance.recordings {
+        add("recordings_plan", serde_json::to_vec_pretty(plan));
+        add("recordings_manifest", serde_json::to_vec_pretty(manifest));
+    }
+    files.extend(pipeline.map(|text| ("pipeline.toml".to_owned(), text.as_bytes().to_vec())));
+    files
+}

@@ -1,0 +1,13 @@
+#!/bin/sh
+# Brings this folder to the Hugging Face hub: sh upload.sh OWNER/NAME
+# Needs the hub's client (pip install huggingface_hub) and a login (hf auth login). Interrupted, the same command goes on.
+# LeRobot opens a dataset on the hub only when the repository has a tag that names the format's version.
+# With git alone: git init, git lfs install, git add, git commit, git tag v3.0, git push ORIGIN main v3.0
+set -eu
+repository=$1
+cd "$(dirname "$0")"
+version=$(sed -n 's/.*"codebase_version": *"\([^"]*\)".*/\1/p' meta/info.json)
+if command -v sha256sum > /dev/null; then sha256sum --quiet -c SHA256SUMS; fi
+hf upload "$repository" . . --repo-type dataset
+hf repos tag create "$repository" "$version" --repo-type dataset
+echo "published: https://huggingface.co/datasets/$repository at $version"
