@@ -8,6 +8,7 @@ mod inspect;
 mod kind;
 mod output;
 mod query;
+mod repair;
 mod replay;
 mod stages;
 mod tasks;
@@ -84,6 +85,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Replay(args) => replay::run(args),
         Command::Query(args) => query::run(args),
         Command::Explain(args) => explain::run(args),
+        Command::Repair(args) => repair::run(args),
         Command::Dataset(command) => dataset::run(command),
         Command::Completions { shell } => completions::run(*shell),
     }

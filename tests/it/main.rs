@@ -13,6 +13,8 @@ mod dataset_edit;
 #[cfg(test)]
 mod expert;
 #[cfg(test)]
+mod export;
+#[cfg(test)]
 mod kinematic;
 #[cfg(test)]
 mod lineage;
@@ -26,6 +28,8 @@ mod pipeline_suites;
 mod query;
 #[cfg(test)]
 mod recording;
+#[cfg(test)]
+mod repair;
 #[cfg(test)]
 mod report;
 #[cfg(test)]
