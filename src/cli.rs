@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::dataset::edit::Ending;
+use crate::dataset::export::LabelForm;
 use crate::pipeline::Stage;
 use crate::program::Program;
 use crate::publish::{Date, License, Release};
@@ -52,6 +53,8 @@ pub enum Command {
     Query(QueryArgs),
     /// Say where an episode, a frame or a model comes from.
     Explain(ExplainArgs),
+    /// Write what can be verified of a broken dataset or recording.
+    Repair(RepairArgs),
     /// Make datasets of datasets, or compare two.
     #[command(subcommand)]
     Dataset(DatasetCommand),
@@ -233,6 +236,19 @@ pub struct ExplainArgs {
     pub json: bool,
 }
 
+/// `ntp repair`.
+#[derive(Debug, Args)]
+pub struct RepairArgs {
+    /// A dataset, or a recording (.mcap).
+    pub path: PathBuf,
+    /// What to write: a new folder or file.
+    #[arg(long, value_name = "PATH")]
+    pub to: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// `ntp dataset`.
 #[derive(Debug, Subcommand)]
 pub enum DatasetCommand {
@@ -244,6 +260,25 @@ pub enum DatasetCommand {
     Split(SplitArgs),
     /// Say which episodes, calls and labels differ between two datasets; exit code 1 when any does.
     Diff(DiffArgs),
+    /// Write the labels in the shapes that others read.
+    Export(ExportArgs),
+}
+
+/// `ntp dataset export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// In which shape: `subtask_index` (a `LeRobotDataset` without what is ours), sarm (the same with SARM's columns),
+    /// behavior (BEHAVIOR-1K's annotation files) or foxglove (`foxglove.Event` messages in an MCAP file).
+    #[arg(long, value_name = "FORM")]
+    pub labels: LabelForm,
+    /// The new folder, or with foxglove the new file.
+    #[arg(long, value_name = "PATH")]
+    pub to: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `ntp dataset merge`.

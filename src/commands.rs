@@ -9,6 +9,7 @@ mod kind;
 mod output;
 mod publish;
 mod query;
+mod repair;
 mod replay;
 mod stages;
 mod tasks;
@@ -90,6 +91,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Replay(args) => replay::run(args),
         Command::Query(args) => query::run(args),
         Command::Explain(args) => explain::run(args),
+        Command::Repair(args) => repair::run(args),
         Command::Dataset(command) => dataset::run(command),
         Command::Publish(args) => publish::run(args, stop),
         Command::Verify(args) => verify::run(args),

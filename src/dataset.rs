@@ -31,6 +31,7 @@ mod episode_rows;
 mod episode_view;
 mod episodes;
 mod error;
+pub mod export;
 mod feature;
 mod finding;
 mod frame_map;

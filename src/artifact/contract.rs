@@ -307,7 +307,12 @@ impl StageDir {
         manifest.files.iter().try_for_each(|file| self.check_file(file, deep))
     }
 
-    fn check_file(&self, expected: &FileEntry, deep: bool) -> Result<(), ContractError> {
+    /// Compares one file with what a manifest says of it, as [`StageDir::check_files`] does.
+    ///
+    /// # Errors
+    ///
+    /// [`ContractError::FileDiffers`] when it is not as it should be.
+    pub fn check_file(&self, expected: &FileEntry, deep: bool) -> Result<(), ContractError> {
         let path = self.path.join(&expected.path);
         let differs = |problem: String| ContractError::FileDiffers { path: path.clone(), problem };
         let Ok(metadata) = std::fs::metadata(&path) else {

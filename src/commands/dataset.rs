@@ -4,11 +4,12 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::cli::{DatasetCommand, DiffArgs, FilterArgs, MergeArgs, SplitArgs};
+use crate::cli::{DatasetCommand, DiffArgs, ExportArgs, FilterArgs, MergeArgs, SplitArgs};
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::edit::{
     ChangedEpisode, Condition, Difference, EditSummary, EpisodeName, SplitBy, Unit, diff, filter, merge, split,
 };
+use crate::dataset::export::{ExportSummary, export};
 
 pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
     match command {
@@ -16,6 +17,7 @@ pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
         DatasetCommand::Filter(args) => run_filter(args),
         DatasetCommand::Split(args) => run_split(args),
         DatasetCommand::Diff(args) => run_diff(args),
+        DatasetCommand::Export(args) => run_export(args),
     }
 }
 
@@ -91,6 +93,17 @@ fn run_diff(args: &DiffArgs) -> anyhow::Result<CommandOutcome> {
         output::print(&diff_text(&found))?;
     }
     Ok(if found.is_none() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}
+
+fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
+    let written = export(&args.dataset, args.labels, &args.to)?;
+    if args.json {
+        output::print_json(&json!({ "path": args.to, "labels": args.labels, "summary": written }))?;
+    } else {
+        let ExportSummary { episodes, labels } = written;
+        output::print(&format!("{}: {labels} labels of {episodes} episodes", args.to.display()))?;
+    }
+    Ok(CommandOutcome::Done)
 }
 
 fn diff_text(found: &Difference) -> String {

@@ -103,7 +103,9 @@ fn stage_text(stage: &StageLineage, depth: usize) -> Vec<String> {
     let mut lines = vec![format!("{indent}{} by ntp {}{commit}{path}", stage.stage, stage.ntp_version)];
     lines.push(format!("{indent}  plan {}", stage.plan_id));
     lines.extend(stage.version.iter().map(|version| format!("{indent}  manifest {version}")));
-    lines.push(format!("{indent}  settings {}", stage.config));
+    // An edited dataset also keeps its sources' plans there: these are told below.
+    let settings = stage.config.get("settings").filter(|_| stage.config.get("sources").is_some());
+    lines.push(format!("{indent}  settings {}", settings.unwrap_or(&stage.config)));
     for (name, input) in &stage.inputs {
         let found = if input.stage.is_some() { "" } else { " (not found here)" };
         lines.push(format!("{indent}  from {name} {}{found}", input.version));

@@ -3,7 +3,7 @@
 //! # Input and output
 //!
 //! [`merge`], [`filter`] and [`split`] read whole datasets episode by episode and write a new folder, which appears
-//! whole or not at all. Rows of every table are carried over as Arrow batches, whatever columns they have; indices,
+//! whole or not at all; [`repair`] does so with what can be read of a broken one. Rows of every table are carried over as Arrow batches, whatever columns they have; indices,
 //! places, task and sub-task texts and statistics are made anew. [`diff`] says what differs between two.
 //!
 //! # Errors
@@ -23,6 +23,7 @@ mod fit;
 mod numbers;
 mod pieces;
 mod renumber;
+mod repair;
 mod rolling;
 mod source;
 mod split;
@@ -39,6 +40,7 @@ pub use condition::{Condition, Ending};
 pub use diff::{ChangedEpisode, Difference, EpisodeName, diff};
 pub use error::EditError;
 use fit::{Seen, check_like, check_version};
+pub use repair::{DatasetRepair, repair};
 use source::{Source, SourceDescription, SourceEpisode};
 pub use split::{SplitBy, Unit, split};
 pub use target::EditSummary;
@@ -99,7 +101,7 @@ fn write(
                 seen.note(source.root(), &episode.row)?;
                 target.append(&episode, &source)?;
             } else {
-                target.leave_out();
+                target.leave_out(1);
             }
         }
         description.episodes = [begin, target.n_episodes()];

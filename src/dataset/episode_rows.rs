@@ -120,27 +120,43 @@ impl EpisodeRows {
     /// Opens the episodes of a dataset and reads its `meta/info.json`.
     pub(crate) fn open(root: &Path) -> Result<(Info, Self), DatasetError> {
         let info: Info = read_json(&root.join(layout::INFO))?;
-        let path = root.join(layout::EPISODES);
-        let columns = EPISODES.columns()?;
-        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-        let reader = TableReader::open_columns(&path, &EPISODES, &names)?;
+        let reader = Self::reader(root)?;
         if reader.n_rows() != info.total_episodes {
             let (found, expected) = (reader.n_rows(), info.total_episodes);
             let problem = format!("it has {found} rows, but {} says {expected} episodes", layout::INFO);
-            return Err(DatasetError::Count { path, problem });
+            return Err(DatasetError::Count { path: root.join(layout::EPISODES), problem });
         }
-        let rows = Self {
-            path,
+        let total = info.total_episodes;
+        Ok((info, Self::new(root, reader, total)))
+    }
+
+    /// Opens the episodes of a dataset whose totals may be wrong: as many as both totals and table have. Also gives how
+    /// many one of them has.
+    pub(crate) fn open_prefix(root: &Path) -> Result<(Info, Self, u64), DatasetError> {
+        let info: Info = read_json(&root.join(layout::INFO))?;
+        let reader = Self::reader(root)?;
+        let (in_table, in_info) = (reader.n_rows(), info.total_episodes);
+        Ok((info, Self::new(root, reader, in_table.min(in_info)), in_table.max(in_info)))
+    }
+
+    fn reader(root: &Path) -> Result<TableReader, DatasetError> {
+        let columns = EPISODES.columns()?;
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        Ok(TableReader::open_columns(&root.join(layout::EPISODES), &EPISODES, &names)?)
+    }
+
+    fn new(root: &Path, reader: TableReader, total: u64) -> Self {
+        Self {
+            path: root.join(layout::EPISODES),
             reader,
             meta: Cursor::new(root, layout::META_EPISODES, META_EPISODES),
             batch: Vec::new().into_iter(),
-            total: info.total_episodes as i64,
+            total: total as i64,
             n_read: 0,
             next_index: 0,
             next_call: 0,
             next_scope: 0,
-        };
-        Ok((info, rows))
+        }
     }
 
     /// The file with the provenance.

@@ -4,9 +4,8 @@
 
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
-use crate::dataset::text::TextTable;
+use crate::dataset::text::{TextTable, subtask_text};
 use crate::program::Program;
-use crate::scene::SlotIndex;
 use crate::table::{Values, WriteOptions};
 use crate::trace::{Frame, Observation};
 
@@ -150,7 +149,8 @@ impl FrameRows {
                 self.program[rows.clone()].fill(path);
             }
             if call.depth == 1 && !rows.is_empty() {
-                let text = subtask_text(view, position);
+                let name = |slot: usize| view.episode.scene.slots[slot].name.as_str();
+                let text = subtask_text(calls, position, name);
                 self.subtask_index[rows].fill(i64::from(self.subtasks.key(&text)));
             }
         }
@@ -201,20 +201,6 @@ fn append_state(flat: &mut Vec<f32>, frame: &Frame) {
     }
     let closed = f32::from(u8::from(frame.state.held.is_some()));
     flat.extend_from_slice(&[1.0 - closed, closed]);
-}
-
-/// A call of the root with the slots that are moved to below it, in order of first use.
-fn subtask_text(view: &EpisodeView<'_>, position: usize) -> String {
-    let calls = &view.episode.calls;
-    let below = calls[position + 1..].iter().take_while(|call| call.depth > calls[position].depth);
-    let mut arguments: Vec<SlotIndex> = Vec::new();
-    for slot in below.filter_map(|call| call.argument) {
-        if !arguments.contains(&slot) {
-            arguments.push(slot);
-        }
-    }
-    let names: Vec<&str> = arguments.iter().map(|&slot| view.episode.scene.slot(slot).name.as_str()).collect();
-    format!("{} {}", calls[position].program, names.join(" ")).trim_end().to_owned()
 }
 
 /// Stacks of running programs, as texts `block_stacking/pick_and_place/pick`.

@@ -14,6 +14,7 @@ use crate::dataset::call_rows::{CallBatch, read_calls};
 use crate::dataset::cursor::Cursor;
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
 use crate::dataset::finding::Validation;
+use crate::dataset::info::Info;
 use crate::dataset::read::{check_tree, n_slots};
 use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
 use crate::dataset::{DatasetError, layout};
@@ -32,7 +33,7 @@ use scopes::ScopeBatch;
 pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
     let texts = meta::check(root, &mut validation);
-    if let Err(error) = check_episodes(root, &texts, &mut validation) {
+    if let Err(error) = check_episodes(root, texts, &mut validation) {
         validation.failed("episodes.row", &error);
     }
     validation
@@ -46,30 +47,61 @@ struct Tables {
     scopes: Option<Cursor<ScopeBatch>>,
 }
 
-fn check_episodes(root: &Path, texts: &Texts, validation: &mut Validation) -> Result<(), DatasetError> {
+fn check_episodes(root: &Path, texts: Texts, validation: &mut Validation) -> Result<(), DatasetError> {
     let (info, mut rows) = EpisodeRows::open(root)?;
-    let n_slots = n_slots(root, &info)?;
-    let mut tables = Tables {
-        frames: Some(Cursor::new(root, layout::DATA, FRAMES)),
-        calls: Some(Cursor::new(root, layout::CALLS, CALLS)),
-        arguments: Some(Cursor::new(root, layout::CALLS, CALLS)),
-        scopes: Some(Cursor::new(root, layout::SCOPES, SCOPES)),
-    };
-    let mut episode_check = EpisodeCheck::default();
-    let mut frame_check = FrameCheck::new(n_slots, info.fps);
-    let mut calls = Vec::new();
+    let mut checks = EpisodeChecks::with_texts(root, &info, texts)?;
     while let Some(row) = rows.next() {
-        let row = row?;
-        validation.episodes += 1;
-        episode_check.check(rows.path(), &row, n_slots, validation);
-        let calls_are_there = tables.check_calls(&row, n_slots, &mut calls, validation);
-        tables.check_frames(&mut frame_check, &row, calls_are_there.then_some(&calls), texts, validation);
-        tables.check_scopes(&row, calls_are_there.then_some(&calls), validation);
+        checks.check(rows.path(), &row?, validation);
     }
-    tables.finish(validation);
-    meta::check_files(root, episode_check.data_places(), validation);
-    frame_check.compare_ranges(root, texts, validation);
+    checks.finish(root, validation);
     Ok(())
+}
+
+/// Checks one episode after another, with its rows of every table.
+pub(crate) struct EpisodeChecks {
+    n_slots: usize,
+    texts: Texts,
+    tables: Tables,
+    episodes: EpisodeCheck,
+    frames: FrameCheck,
+    calls: Vec<ProgramCall>,
+}
+
+impl EpisodeChecks {
+    /// Begins with the first episode of a dataset.
+    pub(crate) fn new(root: &Path, info: &Info) -> Result<Self, DatasetError> {
+        let texts = meta::check(root, &mut Validation::default());
+        Self::with_texts(root, info, texts)
+    }
+
+    fn with_texts(root: &Path, info: &Info, texts: Texts) -> Result<Self, DatasetError> {
+        let n_slots = n_slots(root, info)?;
+        let tables = Tables {
+            frames: Some(Cursor::new(root, layout::DATA, FRAMES)),
+            calls: Some(Cursor::new(root, layout::CALLS, CALLS)),
+            arguments: Some(Cursor::new(root, layout::CALLS, CALLS)),
+            scopes: Some(Cursor::new(root, layout::SCOPES, SCOPES)),
+        };
+        let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.fps));
+        Ok(Self { n_slots, texts, tables, episodes, frames, calls: Vec::new() })
+    }
+
+    /// Checks the next episode; `path` is the file of its row.
+    pub(crate) fn check(&mut self, path: &Path, row: &EpisodeRow, validation: &mut Validation) {
+        let Self { n_slots, texts, tables, episodes, frames, calls } = self;
+        validation.episodes += 1;
+        episodes.check(path, row, *n_slots, validation);
+        let calls_are_there = tables.check_calls(row, *n_slots, calls, validation);
+        tables.check_frames(frames, row, calls_are_there.then_some(&*calls), texts, validation);
+        tables.check_scopes(row, calls_are_there.then_some(&*calls), validation);
+    }
+
+    /// Checks what is there of all episodes together.
+    fn finish(self, root: &Path, validation: &mut Validation) {
+        self.tables.finish(validation);
+        meta::check_files(root, self.episodes.data_places(), validation);
+        self.frames.compare_ranges(root, &self.texts, validation);
+    }
 }
 
 impl Tables {

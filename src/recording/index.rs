@@ -21,7 +21,7 @@ use crate::task::Family;
 pub(super) struct Channel {
     pub(super) topic: String,
     pub(super) schema: String,
-    encoding: String,
+    pub(super) encoding: String,
 }
 
 /// The index of a recording of ours.
@@ -205,8 +205,8 @@ fn read_metadata(
     parse_metadata(&content).ok_or_else(|| broken(path, place.0, "metadata record"))
 }
 
-/// Name, size of the map, keys and values.
-fn parse_metadata(content: &[u8]) -> Option<BTreeMap<String, String>> {
+/// The content of a metadata record: name, size of the map, keys and values.
+pub(super) fn parse_metadata(content: &[u8]) -> Option<BTreeMap<String, String>> {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).ok();
     let mut fields = Fields::new(content);
     let (_name, _size) = (fields.text()?, fields.u32()?);
@@ -217,7 +217,11 @@ fn parse_metadata(content: &[u8]) -> Option<BTreeMap<String, String>> {
     Some(metadata)
 }
 
-fn check_metadata(path: &Path, metadata: &BTreeMap<String, String>) -> Result<Option<Family>, RecordingError> {
+/// Whether this version can read a recording with this metadata; gives the family of its tasks.
+pub(super) fn check_metadata(
+    path: &Path,
+    metadata: &BTreeMap<String, String>,
+) -> Result<Option<Family>, RecordingError> {
     let word = |key: &str| metadata.get(key).map(String::as_str).unwrap_or_default();
     let found = word("schema_version");
     if found != SCHEMA_VERSION.to_string() {
@@ -235,11 +239,16 @@ fn check_metadata(path: &Path, metadata: &BTreeMap<String, String>) -> Result<Op
 /// Log time, create time, name, media type, length, data, checksum.
 fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Result<String, RecordingError> {
     let content = read_record(path, file, size, place, (op::ATTACHMENT, "attachment"))?;
-    let broken = || broken(path, place.0, "attachment");
+    parse_plan(path, place.0, &content)
+}
+
+/// The text of the attachment at an offset, checked.
+pub(super) fn parse_plan(path: &Path, offset: u64, content: &[u8]) -> Result<String, RecordingError> {
+    let broken = || broken(path, offset, "attachment");
     let (checked, checksum) = content.split_last_chunk().ok_or_else(broken)?;
     let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32fast::hash(checked));
     if saved != calculated {
-        return Err(damaged(path, place.0, McapError::BadAttachmentCrc { saved, calculated }));
+        return Err(damaged(path, offset, McapError::BadAttachmentCrc { saved, calculated }));
     }
     let data = || -> Option<&[u8]> {
         let mut fields = Fields::new(checked);
@@ -251,7 +260,7 @@ fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Resu
     let data = data().ok_or_else(broken)?.to_vec();
     String::from_utf8(data).map_err(|_error| RecordingError::Damaged {
         path: path.to_owned(),
-        offset: place.0,
+        offset,
         source: Damage::Text { record: PLAN },
     })
 }

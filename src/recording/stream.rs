@@ -28,7 +28,7 @@ pub(super) struct RawMessage<'a> {
 }
 
 impl<'a> RawMessage<'a> {
-    fn parse(record: &'a [u8], offset: u64) -> Option<Self> {
+    pub(super) fn parse(record: &'a [u8], offset: u64) -> Option<Self> {
         let mut fields = Fields::new(record);
         let (channel, sequence, log_time_nanos) = (fields.u16()?, fields.u32()?, fields.u64()?);
         let _publish_time = fields.u64()?;
@@ -75,8 +75,28 @@ impl Stream {
         &mut self,
         mut visit: impl FnMut(&RawMessage<'_>) -> Result<ControlFlow<T>, RecordingError>,
     ) -> Result<Option<T>, RecordingError> {
+        let (path, mut last_log_time_nanos) = (self.path.clone(), self.last_log_time_nanos);
+        let value = self.records(|opcode, record, offset| {
+            if opcode != op::MESSAGE {
+                return Ok(ControlFlow::Continue(()));
+            }
+            let message =
+                RawMessage::parse(record, offset).ok_or_else(|| damaged(&path, offset, McapError::UnexpectedEoc))?;
+            check_time(&path, &message, &mut last_log_time_nanos)?;
+            visit(&message)
+        });
+        self.last_log_time_nanos = last_log_time_nanos;
+        value
+    }
+
+    /// Gives records (opcode, content, how far the file had been read) to `visit` until it breaks; those of a chunk one
+    /// by one.
+    pub(super) fn records<T>(
+        &mut self,
+        mut visit: impl FnMut(u8, &[u8], u64) -> Result<ControlFlow<T>, RecordingError>,
+    ) -> Result<Option<T>, RecordingError> {
         loop {
-            let Self { path, reader, chunk, offset, last_log_time_nanos, .. } = self;
+            let Self { path, reader, chunk, offset, .. } = self;
             let damaged = |error| damaged(path, *offset, error);
             let (opcode, record) = if chunk.is_empty() {
                 match reader.next_event() {
@@ -95,12 +115,7 @@ impl Stream {
             } else {
                 chunk.next().map_err(damaged)?
             };
-            if opcode != op::MESSAGE {
-                continue;
-            }
-            let message = RawMessage::parse(record, *offset).ok_or_else(|| damaged(McapError::UnexpectedEoc))?;
-            check_time(path, &message, last_log_time_nanos)?;
-            if let ControlFlow::Break(value) = visit(&message)? {
+            if let ControlFlow::Break(value) = visit(opcode, record, *offset)? {
                 return Ok(Some(value));
             }
         }

@@ -92,6 +92,11 @@ impl ShardWriter {
         })
     }
 
+    /// Keeps another plan in it than the one that it began with.
+    pub(super) fn set_plan(&mut self, plan_json: String) {
+        self.plan_json = plan_json;
+    }
+
     /// Writes one episode behind those before.
     ///
     /// # Errors

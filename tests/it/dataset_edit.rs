@@ -385,8 +385,10 @@ fn every_refusal_is_documented_and_no_other() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = root.join("src/dataset/edit");
     let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    let text: String =
-        files.chain([root.join("src/dataset/edit.rs")]).map(|path| std::fs::read_to_string(path).unwrap()).collect();
+    let text: String = files
+        .chain(["edit.rs", "export.rs"].map(|file| root.join("src/dataset").join(file)))
+        .map(|path| std::fs::read_to_string(path).unwrap())
+        .collect();
     let is_code = |word: &&str| word.starts_with("edit.") && word[5..].chars().all(|c| c.is_ascii_lowercase());
     let used: BTreeSet<&str> = text.split('"').filter(is_code).collect();
     let page = std::fs::read_to_string(root.join("schemas/findings.md")).unwrap();

@@ -16,6 +16,7 @@ mod expert;
 mod fuzz;
 #[cfg(test)]
 mod kill;
+mod export;
 #[cfg(test)]
 mod kinematic;
 #[cfg(test)]
@@ -40,6 +41,7 @@ mod query;
 mod recording;
 #[cfg(test)]
 mod render;
+mod repair;
 #[cfg(test)]
 mod report;
 #[cfg(test)]

@@ -6,6 +6,7 @@ use arrow::error::ArrowError;
 
 use crate::artifact::{ContractError, IoError, StagingError};
 use crate::dataset::DatasetError;
+use crate::recording::RecordingError;
 use crate::table::TableError;
 
 /// A dataset could not be edited.
@@ -26,6 +27,9 @@ pub enum EditError {
     /// The folder could not be made.
     #[error(transparent)]
     Staging(#[from] StagingError),
+    /// A recording could not be written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// Rows could not be put together.
     #[error("{}: {source}", path.display())]
     Rows {
@@ -47,11 +51,11 @@ pub enum EditError {
 }
 
 impl EditError {
-    pub(super) fn refused(code: &'static str, path: &Path, problem: impl Into<String>) -> Self {
+    pub(in crate::dataset) fn refused(code: &'static str, path: &Path, problem: impl Into<String>) -> Self {
         Self::Refused { code, path: path.to_owned(), problem: problem.into() }
     }
 
-    pub(super) fn rows(path: impl Into<PathBuf>) -> impl FnOnce(ArrowError) -> Self {
+    pub(in crate::dataset) fn rows(path: impl Into<PathBuf>) -> impl FnOnce(ArrowError) -> Self {
         let path = path.into();
         move |source| Self::Rows { path, source }
     }

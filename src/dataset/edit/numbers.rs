@@ -28,12 +28,22 @@ pub(super) fn values<'r>(
         let column = rows.column_by_name(&feature.name);
         let values = match feature.dtype {
             Dtype::Bool => (flags.len() == rows.num_rows()).then_some(Values::Boolean(flags)),
-            _ => column.and_then(|column| numbers(column, feature)),
+            _ => column.and_then(|column| numbers(column, feature)).filter(|values| is_of(*values, feature.dtype)),
         };
         let wrong = || ArrowError::SchemaError(format!("column {:?} is not as it is declared", feature.name));
         Ok((feature.name.as_str(), values.ok_or_else(wrong)?))
     };
     features.iter().zip(flags).map(column).collect()
+}
+
+/// Whether values are of the type that is declared.
+fn is_of(values: Values<'_>, dtype: Dtype) -> bool {
+    match values {
+        Values::Float32(_) | Values::Float32Vector(..) => dtype == Dtype::Float32,
+        Values::Float64(_) | Values::Float64Vector(..) => dtype == Dtype::Float64,
+        Values::Int64(_) | Values::Int64Vector(..) => dtype == Dtype::Int64,
+        _ => false,
+    }
 }
 
 fn numbers<'r>(column: &'r ArrayRef, feature: &NumericFeature) -> Option<Values<'r>> {
@@ -45,23 +55,32 @@ fn numbers<'r>(column: &'r ArrayRef, feature: &NumericFeature) -> Option<Values<
         DataType::FixedSizeList(item, length) if *length as usize == width => {
             let list = column.as_fixed_size_list_opt()?;
             let begin = list.value_offset(0) as usize;
-            let end = begin + width * column.len();
-            match item.data_type() {
-                DataType::Float32 => Some(Values::Float32Vector(
-                    &list.values().as_primitive_opt::<Float32Type>()?.values()[begin..end],
-                    width,
-                )),
-                DataType::Float64 => Some(Values::Float64Vector(
-                    &list.values().as_primitive_opt::<Float64Type>()?.values()[begin..end],
-                    width,
-                )),
-                DataType::Int64 => Some(Values::Int64Vector(
-                    &list.values().as_primitive_opt::<Int64Type>()?.values()[begin..end],
-                    width,
-                )),
-                _ => None,
-            }
+            vectors(list.values(), item.data_type(), begin..begin + width * column.len(), width)
         }
+        DataType::List(item) => {
+            let list = column.as_list_opt::<i32>()?;
+            let is_regular = list.offsets().windows(2).all(|ends| ends[1] - ends[0] == width as i32);
+            let (begin, end) = (*list.offsets().first()? as usize, *list.offsets().last()? as usize);
+            is_regular.then(|| vectors(list.values(), item.data_type(), begin..end, width)).flatten()
+        }
+        _ => None,
+    }
+}
+
+fn vectors<'r>(
+    values: &'r ArrayRef,
+    data_type: &DataType,
+    range: std::ops::Range<usize>,
+    width: usize,
+) -> Option<Values<'r>> {
+    match data_type {
+        DataType::Float32 => {
+            Some(Values::Float32Vector(&values.as_primitive_opt::<Float32Type>()?.values()[range], width))
+        }
+        DataType::Float64 => {
+            Some(Values::Float64Vector(&values.as_primitive_opt::<Float64Type>()?.values()[range], width))
+        }
+        DataType::Int64 => Some(Values::Int64Vector(&values.as_primitive_opt::<Int64Type>()?.values()[range], width)),
         _ => None,
     }
 }

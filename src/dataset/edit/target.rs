@@ -161,9 +161,9 @@ impl Target {
         self.write_full_groups()
     }
 
-    /// Counts an episode that is not wanted.
-    pub(super) fn leave_out(&mut self) {
-        self.summary.left_out += 1;
+    /// Counts episodes that are not wanted.
+    pub(super) fn leave_out(&mut self, n_episodes: u64) {
+        self.summary.left_out += n_episodes;
     }
 
     /// Takes down families and slots; where the names of slots differ, features are named by number.
@@ -310,7 +310,12 @@ fn numeric_features(info: &Info, columns: &Schema) -> Vec<NumericFeature> {
         let of_ours = FEATURES.iter().find(|feature| feature.name == name);
         let is_of_episodes = of_ours.is_some_and(Feature::has_episode_statistics);
         let &[width] = &declared.shape[..] else { return None };
-        is_number.then(|| NumericFeature { name: name.to_owned(), dtype: declared.dtype, width, is_of_episodes })
+        (is_number && width > 0).then(|| NumericFeature {
+            name: name.to_owned(),
+            dtype: declared.dtype,
+            width,
+            is_of_episodes,
+        })
     };
     columns.fields().iter().filter_map(|field| numeric(field.name())).collect()
 }

@@ -1,0 +1,139 @@
+//! What can be verified of a broken dataset.
+//!
+//! Episodes are kept from the first one on, until one breaks a rule, cannot be read, or lies in a file that is not as
+//! the manifest says. Nothing behind it is looked at: indices and texts count from the beginning, and what follows a
+//! fault would have to be guessed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::json;
+
+use crate::artifact::{StageDir, StagedDir};
+use crate::dataset::edit::fit::check_version;
+use crate::dataset::edit::source::{Source, SourceEpisode};
+use crate::dataset::edit::target::Target;
+use crate::dataset::edit::{EditError, EditSummary, commit};
+use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::finding::{Severity, Validation};
+use crate::dataset::layout;
+use crate::dataset::validate::EpisodeChecks;
+
+/// What became of a dataset.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct DatasetRepair {
+    /// Why it is not whole; empty when it is, and then nothing is written.
+    pub reasons: Vec<String>,
+    /// What was written.
+    pub written: Option<EditSummary>,
+}
+
+/// Writes the longest verified prefix of a dataset that is not whole.
+///
+/// # Errors
+///
+/// [`EditError::Refused`] when not even the first episode can be verified.
+pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
+    let files = changed_files(root);
+    let validation = crate::dataset::validate(root);
+    let told = validation.findings.iter().filter(|finding| finding.severity == Severity::Error);
+    let told = told.map(|of| format!("{} {}: {} {}", of.code, of.path.display(), of.place, of.message));
+    let mut reasons: Vec<String> = files.values().cloned().chain(told.take(1)).collect();
+    if reasons.is_empty() {
+        return Ok(DatasetRepair { reasons, written: None });
+    }
+    check_roots(root, &files)?;
+    let staged = StagedDir::begin(to)?;
+    let (info, rows, total) = EpisodeRows::open_prefix(root)?;
+    let mut prefix = Prefix::open(root, info, rows, files)?;
+    let mut target = Target::create(staged.partial_path(), &prefix.source)?;
+    let mut description = prefix.source.describe()?;
+    let end = loop {
+        match prefix.next_verified() {
+            Ok(Some(episode)) => target.append(&episode, &prefix.source)?,
+            Ok(None) => break None,
+            Err(reason) => break Some(reason),
+        }
+    };
+    reasons.extend(end.into_iter().filter(|end| !reasons.contains(end)).collect::<Vec<_>>());
+    let n_kept = target.n_episodes();
+    if n_kept == 0 {
+        return Err(nothing(root, &reasons));
+    }
+    target.leave_out(total.saturating_sub(n_kept));
+    description.episodes = [0, n_kept];
+    let summary = target.finish(prefix.source.ntp.failed_left_out)?;
+    let settings = json!({ "left_out": summary.left_out });
+    commit("repair", &[description], settings, staged.partial_path(), &summary)?;
+    staged.commit()?;
+    Ok(DatasetRepair { reasons, written: Some(summary) })
+}
+
+fn nothing(root: &Path, reasons: &[String]) -> EditError {
+    let problem = format!("not even its first episode can be verified: {}", reasons.join("; "));
+    EditError::refused("edit.empty", root, problem)
+}
+
+/// Files that are not as the manifest says, with what is wrong; empty where there is no manifest.
+fn changed_files(root: &Path) -> BTreeMap<PathBuf, String> {
+    let dir = StageDir::new("dataset", root);
+    let manifest = dir.manifest().ok().flatten();
+    let files = manifest.iter().flat_map(|manifest| &manifest.files);
+    let changed = |file| dir.check_file(file, true).err().map(|error| (root.join(&file.path), error.to_string()));
+    files.filter_map(changed).collect()
+}
+
+/// What every episode hangs on must be as it was written. Statistics and task texts are made anew from the rest.
+fn check_roots(root: &Path, changed: &BTreeMap<PathBuf, String>) -> Result<(), EditError> {
+    let needed = [layout::INFO, layout::NTP_INFO, layout::SUBTASKS, layout::EPISODES].map(|file| root.join(file));
+    let reasons: Vec<String> = needed.iter().filter_map(|file| changed.get(file).cloned()).collect();
+    if reasons.is_empty() { Ok(()) } else { Err(nothing(root, &reasons)) }
+}
+
+/// Episodes from the first one on, each verified.
+struct Prefix {
+    source: Source,
+    checks: EpisodeChecks,
+    changed: BTreeMap<PathBuf, String>,
+}
+
+impl Prefix {
+    fn open(
+        root: &Path,
+        info: crate::dataset::info::Info,
+        rows: EpisodeRows,
+        changed: BTreeMap<PathBuf, String>,
+    ) -> Result<Self, EditError> {
+        let checks = EpisodeChecks::new(root, &info)?;
+        let source = Source::with_rows(root, info, rows)?;
+        check_version(&source)?;
+        Ok(Self { source, checks, changed })
+    }
+
+    /// The next episode, or why it is not verified.
+    fn next_verified(&mut self) -> Result<Option<SourceEpisode>, String> {
+        let Some(episode) = self.source.next_episode().map_err(|error| error.to_string())? else { return Ok(None) };
+        if let Some(reason) = self.changed_file(&episode.row) {
+            return Err(reason);
+        }
+        let mut validation = Validation::default();
+        self.checks.check(&self.source.root().join(layout::EPISODES), &episode.row, &mut validation);
+        let found = validation.findings.iter().find(|finding| finding.severity == Severity::Error);
+        match found {
+            None => Ok(Some(episode)),
+            Some(of) => Err(format!("{} {}: {} {}", of.code, of.path.display(), of.place, of.message)),
+        }
+    }
+
+    fn changed_file(&self, row: &EpisodeRow) -> Option<String> {
+        let root = self.source.root();
+        let places = [
+            (layout::DATA, row.data),
+            (layout::CALLS, row.calls),
+            (layout::SCOPES, row.scopes),
+            (layout::META_EPISODES, row.meta),
+        ];
+        places.into_iter().find_map(|(folder, place)| self.changed.get(&place.in_dataset(root, folder)).cloned())
+    }
+}

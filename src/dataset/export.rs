@@ -1,0 +1,88 @@
+//! Labels in the shapes that others read.
+//!
+//! # Input and output
+//!
+//! [`export`] reads a dataset of ours and writes one of the forms of [`LabelForm`]. Programs become two levels of
+//! labels: **sub-tasks**, the root's callees (`pick_and_place block_D block_B`), and **skills**, the calls that call
+//! primitives, in words (`pick block_D`). A label holds from its call to the next one: it has the frames from which its
+//! call goes on, and the episode's last frame belongs to the last label.
+//!
+//! # Invariants
+//!
+//! Memory holds one episode, or some thousand rows. What is written appears whole or not at all.
+
+mod behavior;
+mod events;
+mod labels;
+mod plain;
+mod sarm;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::artifact::StagedDir;
+use crate::dataset::edit::EditError;
+
+/// What labels are written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LabelForm {
+    /// A `LeRobotDataset` with the column `subtask_index` and `meta/subtasks.parquet`, and nothing of ours.
+    SubtaskIndex,
+    /// The same with SARM's columns in `meta/episodes` and `meta/temporal_proportions_{sparse,dense}.json`.
+    Sarm,
+    /// BEHAVIOR-1K's `annotations/task-XXXX/episode_XXXXXXXX.json`.
+    Behavior,
+    /// `foxglove.Event` messages, one a call, in an MCAP file.
+    Foxglove,
+}
+
+impl std::str::FromStr for LabelForm {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "subtask_index" => Ok(Self::SubtaskIndex),
+            "sarm" => Ok(Self::Sarm),
+            "behavior" => Ok(Self::Behavior),
+            "foxglove" => Ok(Self::Foxglove),
+            _ => Err(format!("unknown form {word:?}; allowed: subtask_index, sarm, behavior, foxglove")),
+        }
+    }
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ExportSummary {
+    /// Episodes.
+    pub episodes: u64,
+    /// Labels of all levels.
+    pub labels: u64,
+}
+
+/// Writes the labels of a dataset to a new folder, or to a file when they are `foxglove`'s.
+///
+/// # Errors
+///
+/// When there is something at `to`, or the dataset cannot be read.
+pub fn export(root: &Path, form: LabelForm, to: &Path) -> Result<ExportSummary, EditError> {
+    if form == LabelForm::Foxglove {
+        if to.exists() {
+            return Err(EditError::refused(
+                "edit.destination",
+                to,
+                "only a new file is written, but this one is there",
+            ));
+        }
+        return events::write(root, to);
+    }
+    let staged = StagedDir::begin(to)?;
+    let summary = match form {
+        LabelForm::SubtaskIndex => plain::write(root, staged.partial_path())?,
+        LabelForm::Sarm => sarm::write(root, staged.partial_path())?,
+        LabelForm::Behavior | LabelForm::Foxglove => behavior::write(root, staged.partial_path())?,
+    };
+    staged.commit()?;
+    Ok(summary)
+}

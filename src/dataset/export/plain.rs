@@ -1,0 +1,103 @@
+//! A dataset without what is ours: a `LeRobotDataset` with `subtask_index`, as before language columns.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::RecordBatch;
+use arrow::datatypes::Schema;
+use arrow::error::ArrowError;
+use serde_json::Value;
+
+use crate::artifact::{IoError, create_dir, read_json, write_json};
+use crate::dataset::DatasetError;
+use crate::dataset::edit::EditError;
+use crate::dataset::episodes::MetaRows;
+use crate::dataset::export::ExportSummary;
+use crate::dataset::frames::FrameRows;
+use crate::dataset::info::{Info, NtpInfo};
+use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::schema::{FRAMES, META_EPISODES};
+use crate::table::{BatchReader, BatchWriter, WriteOptions};
+
+/// Rows that are read and written at a time.
+const BATCH_ROWS: usize = 8192;
+
+/// Writes the dataset.
+pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
+    let (info, labels) = write_frames(root, to)?;
+    copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &MetaRows::options(), Ok)?;
+    Ok(ExportSummary { episodes: info.total_episodes, labels })
+}
+
+/// Writes all but the rows of episodes. Each frame has a label.
+pub(super) fn write_frames(root: &Path, to: &Path) -> Result<(Info, u64), EditError> {
+    let mut info: Info = read_json(&root.join(layout::INFO))?;
+    let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
+    copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots), Ok)?;
+    info.features.0.retain(|(name, _)| !is_ours(name));
+    write_json(&to.join(layout::INFO), &info)?;
+    let mut stats: BTreeMap<String, Value> = read_json(&root.join(layout::STATS))?;
+    stats.retain(|name, _| !is_ours(name));
+    write_json(&to.join(layout::STATS), &stats)?;
+    for file in [layout::TASKS, layout::SUBTASKS] {
+        std::fs::copy(root.join(file), to.join(file)).map_err(IoError::system("copy", root.join(file)))?;
+    }
+    let labels = info.total_frames;
+    Ok((info, labels))
+}
+
+/// Columns that only this project knows.
+pub(super) fn is_ours(name: &str) -> bool {
+    name.starts_with("ntp.") || name.starts_with("ntp/")
+}
+
+/// Writes each file of a folder again, without columns of ours and changed by `change`.
+pub(super) fn copy_files(
+    root: &Path,
+    to: &Path,
+    (folder, name): (&str, &str),
+    options: &WriteOptions,
+    mut change: impl FnMut(RecordBatch) -> Result<RecordBatch, EditError>,
+) -> Result<(), EditError> {
+    create_dir(&to.join(folder))?;
+    let mut place = FilePlace::default();
+    while place == FilePlace::default() || place.in_dataset(root, folder).exists() {
+        let path = place.in_dataset(root, folder);
+        let mut reader = BatchReader::open(&path, BATCH_ROWS)?;
+        let mut writer: Option<BatchWriter> = None;
+        while let Some(rows) = reader.next_batch()? {
+            let rows = change(without_ours(&rows).map_err(EditError::rows(&path))?)?;
+            let mut open = match writer.take() {
+                Some(open) => open,
+                None => BatchWriter::create(&place.in_dataset(to, folder), name, rows.schema_ref(), options.clone())?,
+            };
+            open.write(&rows)?;
+            writer = Some(open);
+        }
+        match writer {
+            Some(writer) => writer.commit()?,
+            None => return Err(DatasetError::Count { path, problem: "it has no rows".to_owned() }.into()),
+        }
+        place = place.next();
+    }
+    Ok(())
+}
+
+fn without_ours(rows: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let schema = rows.schema();
+    let kept: Vec<usize> = (0..schema.fields().len()).filter(|&at| !is_ours(schema.field(at).name())).collect();
+    rows.project(&kept)
+}
+
+/// The rows with further columns.
+pub(super) fn with_columns(
+    rows: &RecordBatch,
+    columns: Vec<(arrow::datatypes::Field, arrow::array::ArrayRef)>,
+) -> Result<RecordBatch, ArrowError> {
+    let (fields, arrays): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+    let schema = rows.schema();
+    let fields: Vec<_> = schema.fields().iter().cloned().chain(fields.into_iter().map(Arc::new)).collect();
+    let arrays = rows.columns().iter().cloned().chain(arrays).collect();
+    RecordBatch::try_new(Arc::new(Schema::new(fields).with_metadata(schema.metadata().clone())), arrays)
+}
