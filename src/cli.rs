@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
+use crate::dataset::edit::Ending;
 use crate::pipeline::Stage;
+use crate::program::Program;
+use crate::task::{Family, Split};
 
 /// Neural Task Programming as a dataset pipeline.
 #[derive(Debug, Parser)]
@@ -46,6 +49,11 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
     Query(QueryArgs),
+    /// Say where an episode, a frame or a model comes from.
+    Explain(ExplainArgs),
+    /// Make datasets of datasets, or compare two.
+    #[command(subcommand)]
+    Dataset(DatasetCommand),
     /// Print a completion script.
     Completions {
         /// For which shell.
@@ -168,4 +176,122 @@ pub struct QueryArgs {
     /// Write the rows to a Parquet file.
     #[arg(long, value_name = "FILE", requires = "sql")]
     pub parquet: Option<PathBuf>,
+}
+
+/// `ntp explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// A dataset, or a model.
+    pub path: PathBuf,
+    /// Which episode of the dataset, by its number.
+    #[arg(long, value_name = "K")]
+    pub episode: Option<u64>,
+    /// Which frame of the episode.
+    #[arg(long, value_name = "F", requires = "episode")]
+    pub frame: Option<u64>,
+    /// A folder in which recordings are looked for, besides `recordings` beside the dataset.
+    #[arg(long, value_name = "DIR")]
+    pub recordings: Vec<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset`.
+#[derive(Debug, Subcommand)]
+pub enum DatasetCommand {
+    /// Write the episodes of several datasets into one, in order.
+    Merge(MergeArgs),
+    /// Write the episodes of a dataset that are as asked for.
+    Filter(FilterArgs),
+    /// Write the parts of a dataset as datasets of their own.
+    Split(SplitArgs),
+    /// Say which episodes, calls and labels differ between two datasets; exit code 1 when any does.
+    Diff(DiffArgs),
+}
+
+/// `ntp dataset merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The datasets.
+    #[arg(value_name = "DATASET", required = true)]
+    pub sources: Vec<PathBuf>,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset filter`. Of an option that is given several times, one value is enough; all options must hold.
+#[derive(Debug, Args)]
+pub struct FilterArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// A task, by its id or its text.
+    #[arg(long, value_name = "TASK")]
+    pub task: Vec<String>,
+    /// A family of tasks.
+    #[arg(long, value_name = "FAMILY")]
+    pub family: Vec<Family>,
+    /// A program that is called.
+    #[arg(long, value_name = "PROGRAM")]
+    pub program: Vec<Program>,
+    /// How it ended: success, failure, or a cause of failure.
+    #[arg(long, value_name = "OUTCOME")]
+    pub outcome: Vec<Ending>,
+    /// Seen or unseen.
+    #[arg(long, value_name = "SPLIT")]
+    pub split: Option<Split>,
+    /// Least number of frames.
+    #[arg(long, value_name = "N")]
+    pub min_frames: Option<u64>,
+    /// Greatest number of frames.
+    #[arg(long, value_name = "N")]
+    pub max_frames: Option<u64>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset split`.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("parts").required(true).args(["by", "shares"]))]
+pub struct SplitArgs {
+    /// The dataset.
+    pub dataset: PathBuf,
+    /// The new folder, with a dataset for each part.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// A part for each value: split, task, family or outcome.
+    #[arg(long, value_name = "WHAT", value_parser = ["split", "task", "family", "outcome"])]
+    pub by: Option<String>,
+    /// Parts drawn at random, e.g. train=0.8,val=0.2.
+    #[arg(long, value_name = "NAME=SHARE,…", value_delimiter = ',')]
+    pub shares: Vec<String>,
+    /// With --shares, what stays together: task (no task is in two parts) or episode.
+    #[arg(long, value_name = "WHAT", value_parser = ["task", "episode"], default_value = "task")]
+    pub unit: String,
+    /// With --shares, the seed of the draw.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp dataset diff`.
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// A dataset.
+    pub before: PathBuf,
+    /// Another one.
+    pub after: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }

@@ -2,6 +2,8 @@
 //! stderr.
 
 mod completions;
+mod dataset;
+mod explain;
 mod inspect;
 mod kind;
 mod output;
@@ -81,6 +83,8 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Query(args) => query::run(args),
+        Command::Explain(args) => explain::run(args),
+        Command::Dataset(command) => dataset::run(command),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

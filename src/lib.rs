@@ -17,6 +17,7 @@ pub mod table;
 
 pub mod dataset;
 pub mod expert;
+pub mod lineage;
 pub mod model;
 pub mod pipeline;
 pub mod query;

@@ -99,7 +99,8 @@ fn set_usual_permissions(file: &File) -> std::io::Result<()> {
     Ok(())
 }
 
-fn sync_folder(path: &Path) -> Result<(), IoError> {
+/// Syncs the folder that a path is in.
+pub(super) fn sync_folder(path: &Path) -> Result<(), IoError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let sync = || File::open(folder)?.sync_all();
     sync().map_err(IoError::system("sync", folder))

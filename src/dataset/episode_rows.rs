@@ -25,7 +25,9 @@ pub(crate) struct EpisodeRow {
     pub(crate) is_success: bool,
     pub(crate) specification: String,
     pub(crate) specification_frames: i64,
+    pub(crate) recording: String,
     pub(crate) recording_sha256: String,
+    pub(crate) recording_index: i64,
     pub(crate) slots: Vec<String>,
     pub(crate) n_frames: i64,
     pub(crate) n_calls: i64,
@@ -36,6 +38,8 @@ pub(crate) struct EpisodeRow {
     pub(crate) first_call: i64,
     pub(crate) scopes: FilePlace,
     pub(crate) first_scope: i64,
+    /// Where its row of `meta/episodes/` is.
+    pub(crate) meta: FilePlace,
 }
 
 struct MetaBatch {
@@ -147,9 +151,9 @@ impl EpisodeRows {
         let (meta, at) = self.meta.next_in_order()?;
         row.data = place(meta.chunk[at], meta.file[at]);
         row.first_index = meta.from[at];
+        row.meta = place(meta.own[0][at], meta.own[1][at]);
         let found = (meta.episode_index[at], meta.length[at], meta.to[at]);
         let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
-        let own = place(meta.own[0][at], meta.own[1][at]);
         let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
         if found != expected {
             return Err(self.meta.problem(format!(
@@ -157,8 +161,10 @@ impl EpisodeRows {
                 layout::EPISODES
             )));
         }
-        if own != self.meta.place() {
-            return Err(self.meta.problem(format!("it says that it is in {}", own.relative(layout::META_EPISODES))));
+        if row.meta != self.meta.place() {
+            return Err(self
+                .meta
+                .problem(format!("it says that it is in {}", row.meta.relative(layout::META_EPISODES))));
         }
         if !tasks_agree {
             return Err(self.meta.problem(format!("its tasks are not the one of {}", layout::EPISODES)));
@@ -209,13 +215,15 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
     let mut text = |name| Ok::<_, TableError>(columns.text(name)?.into_iter());
     let [mut task_id, mut task_text, mut family] = [text("task_id")?, text("task_text")?, text("family")?];
     let [mut split, mut actor, mut outcome] = [text("split")?, text("actor")?, text("outcome")?];
-    let [mut specification, mut recording_sha256] = [text("specification")?, text("recording_sha256")?];
+    let [mut specification, mut recording] = [text("specification")?, text("recording")?];
+    let mut recording_sha256 = text("recording_sha256")?;
     let mut cause = columns.optional_text("cause")?.into_iter();
     let mut slots = columns.text_list("slots")?.into_iter();
     let success = columns.boolean("success")?;
     let mut number = |name| columns.int64(name);
     let (episode_index, trial) = (number("episode_index")?, number("trial")?);
     let (specification_frames, n_frames) = (number("specification_frames")?, number("n_frames")?);
+    let recording_index = number("recording_index")?;
     let (n_calls, n_scopes) = (number("n_calls")?, number("n_scopes")?);
     let calls = [number("calls/chunk_index")?, number("calls/file_index")?, number("calls_from_index")?];
     let scopes = [number("scopes/chunk_index")?, number("scopes/file_index")?, number("scopes_from_index")?];
@@ -233,7 +241,9 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
             is_success: success[at],
             specification: specification.next()?,
             specification_frames: specification_frames[at],
+            recording: recording.next()?,
             recording_sha256: recording_sha256.next()?,
+            recording_index: recording_index[at],
             slots: slots.next()?,
             n_frames: n_frames[at],
             n_calls: n_calls[at],
@@ -244,6 +254,7 @@ fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
             first_call: calls[2][at],
             scopes: place(scopes[0][at], scopes[1][at]),
             first_scope: scopes[2][at],
+            meta: FilePlace::default(),
         })
     };
     Ok((0..n_rows).filter_map(row).collect())

@@ -84,14 +84,15 @@ impl Info {
     }
 }
 
-fn declared(feature: &Feature, slots: &[String]) -> (String, FeatureInfo) {
+/// A feature as it is declared where slots have these names.
+pub(crate) fn declared(feature: &Feature, slots: &[String]) -> (String, FeatureInfo) {
     let shape = vec![feature.width(slots.len())];
     (feature.name.to_owned(), FeatureInfo { dtype: feature.dtype, shape, names: feature.value_names(slots) })
 }
 
 /// `meta/stats.json`: statistics by feature, in the order of the columns.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Stats(pub(crate) Vec<(&'static str, FeatureStatistics)>);
+pub(crate) struct Stats(pub(crate) Vec<(String, FeatureStatistics)>);
 
 impl Serialize for Stats {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

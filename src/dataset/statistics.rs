@@ -16,7 +16,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::IoError;
-use crate::dataset::feature::{FEATURES, Feature};
+use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::table::Values;
 
 use number::{copy_keys, copy_values, key_of};
@@ -107,9 +107,36 @@ impl Moments {
     }
 }
 
+/// A feature that has statistics.
+#[derive(Clone, Debug)]
+pub(crate) struct NumericFeature {
+    pub(crate) name: String,
+    pub(crate) dtype: Dtype,
+    pub(crate) width: usize,
+    /// Whether each episode has statistics of its own.
+    pub(crate) is_of_episodes: bool,
+}
+
+impl NumericFeature {
+    /// Those of a dataset of ours, in the order of the columns.
+    pub(crate) fn all(n_slots: usize) -> Vec<Self> {
+        let numeric = FEATURES.iter().filter(|feature| feature.is_numeric());
+        numeric.map(|feature| Self::of(feature, n_slots)).collect()
+    }
+
+    fn of(feature: &Feature, n_slots: usize) -> Self {
+        Self {
+            name: feature.name.to_owned(),
+            dtype: feature.dtype,
+            width: feature.width(n_slots),
+            is_of_episodes: feature.has_episode_statistics(),
+        }
+    }
+}
+
 /// One feature's statistics of the episodes that are not yet written, and of all.
 struct Gathered {
-    feature: &'static Feature,
+    feature: NumericFeature,
     columns: [String; 5],
     /// Minimum, maximum, mean and deviation of each episode, dimension by dimension.
     lists: [Vec<f64>; 4],
@@ -128,9 +155,8 @@ pub(crate) struct Statistics {
 
 impl Statistics {
     /// Begins; numbers that are too many for memory are kept in a temporary file in `folder`.
-    pub(crate) fn new(folder: &Path, n_slots: usize) -> Self {
-        let numeric = FEATURES.iter().filter(|feature| feature.is_numeric());
-        let features = numeric.map(|feature| Gathered::new(feature, feature.width(n_slots))).collect();
+    pub(crate) fn new(folder: &Path, features: Vec<NumericFeature>) -> Self {
+        let features = features.into_iter().map(Gathered::new).collect();
         Self { features, spool: Spool::new(folder), values: Vec::new(), bytes: Vec::new() }
     }
 
@@ -157,7 +183,7 @@ impl Statistics {
 
     /// The episodes' statistics as the columns `stats/FEATURE/NAME`.
     pub(crate) fn columns(&self) -> impl Iterator<Item = (&str, Values<'_>)> {
-        self.features.iter().filter(|of| of.feature.has_episode_statistics()).flat_map(Gathered::columns)
+        self.features.iter().filter(|of| of.feature.is_of_episodes).flat_map(Gathered::columns)
     }
 
     /// Forgets the episodes' statistics, but not that of the whole.
@@ -169,23 +195,23 @@ impl Statistics {
     }
 
     /// Statistics of the whole dataset, by feature.
-    pub(crate) fn finish(self) -> Result<Vec<(&'static str, FeatureStatistics)>, IoError> {
+    pub(crate) fn finish(self) -> Result<Vec<(String, FeatureStatistics)>, IoError> {
         let mut selectors: Vec<Vec<Selector>> = self.features.iter().map(Gathered::selectors).collect();
         self.spool.select(&mut selectors)?;
         let pairs = self.features.iter().zip(&selectors);
-        Ok(pairs.map(|(of, selectors)| (of.feature.name, of.whole_statistics(selectors))).collect())
+        Ok(pairs.map(|(of, selectors)| (of.feature.name.clone(), of.whole_statistics(selectors))).collect())
     }
 }
 
 impl Gathered {
-    fn new(feature: &'static Feature, width: usize) -> Self {
+    fn new(feature: NumericFeature) -> Self {
         Self {
-            feature,
             columns: ["min", "max", "mean", "std", "count"].map(|name| format!("stats/{}/{name}", feature.name)),
             lists: Default::default(),
             counts: Vec::new(),
-            episode: Moments::new(width),
-            whole: Moments::new(width),
+            episode: Moments::new(feature.width),
+            whole: Moments::new(feature.width),
+            feature,
         }
     }
 
@@ -193,7 +219,7 @@ impl Gathered {
     fn append(&mut self, values: &[f64]) {
         self.episode.measure(values);
         self.whole.merge(&self.episode);
-        if self.feature.has_episode_statistics() {
+        if self.feature.is_of_episodes {
             let [min, max, mean, std] = &mut self.lists;
             min.extend_from_slice(&self.episode.min);
             max.extend_from_slice(&self.episode.max);

@@ -12,7 +12,7 @@ use crate::dataset::frames::{EpisodeIds, FrameRows};
 use crate::dataset::info::{Info, NTP_VERSION, NtpInfo, Stats, Totals};
 use crate::dataset::rolling::RollingTable;
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
-use crate::dataset::statistics::Statistics;
+use crate::dataset::statistics::{NumericFeature, Statistics};
 use crate::dataset::text::TextTable;
 use crate::dataset::text_files::{write_subtasks, write_tasks};
 use crate::dataset::{ConvertError, ConvertSummary, layout};
@@ -22,12 +22,12 @@ use crate::task::Family;
 use crate::trace::Episode;
 
 /// Rows of frames and of calls that make a row group, at least. A row group holds whole episodes.
-const GROUP_ROWS: usize = 1 << 13;
+pub(super) const GROUP_ROWS: usize = 1 << 13;
 /// The same for scoping labels, which are many and small.
-const SCOPE_GROUP_ROWS: usize = 1 << 15;
+pub(super) const SCOPE_GROUP_ROWS: usize = 1 << 15;
 /// The same for episodes.
-const EPISODE_GROUP_ROWS: usize = 1 << 12;
-const MEGABYTE: usize = 1 << 20;
+pub(super) const EPISODE_GROUP_ROWS: usize = 1 << 12;
+pub(super) const MEGABYTE: usize = 1 << 20;
 
 /// Everything that can begin once the number of slots is known.
 pub(super) struct Tables {
@@ -69,7 +69,7 @@ impl Tables {
             scopes: ScopeRows::default(),
             provenance: ProvenanceRows::default(),
             meta: MetaRows::default(),
-            statistics: Statistics::new(root, n_slots),
+            statistics: Statistics::new(root, NumericFeature::all(n_slots)),
             data_files: rolling(layout::DATA, FRAMES, FrameRows::options(n_slots)),
             call_files: rolling(layout::CALLS, CALLS, CallRows::options()),
             scope_files: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),

@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
+use crate::dataset::layout;
 use crate::dataset::schema::{SUBTASKS, TASKS};
-use crate::dataset::{ConvertError, layout};
-use crate::table::{TableSchema, TableWriter, Values, WriteOptions};
+use crate::table::{TableError, TableSchema, TableWriter, Values, WriteOptions};
 
 /// Writes `meta/tasks.parquet`.
-pub(super) fn write_tasks(root: &Path, texts: &[String]) -> Result<(), ConvertError> {
+pub(super) fn write_tasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
     let metadata = pandas_index("task_index", "__index_level_0__", None);
     write_texts(root, layout::TASKS, TASKS, ["task_index", "__index_level_0__"], texts, metadata)
 }
 
 /// Writes `meta/subtasks.parquet`.
-pub(super) fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), ConvertError> {
+pub(super) fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
     let metadata = pandas_index("subtask_index", "subtask", Some("subtask"));
     write_texts(root, layout::SUBTASKS, SUBTASKS, ["subtask_index", "subtask"], texts, metadata)
 }
@@ -25,12 +25,12 @@ fn write_texts(
     [number, text]: [&'static str; 2],
     texts: &[String],
     pandas: String,
-) -> Result<(), ConvertError> {
+) -> Result<(), TableError> {
     let options = WriteOptions { metadata: vec![("pandas".to_owned(), pandas)], ..WriteOptions::default() };
     let mut writer = TableWriter::create(&root.join(file), &schema, options)?;
     let numbers: Vec<i64> = (0..texts.len() as i64).collect();
     writer.write_row_group(&[(number, Values::Int64(&numbers)), (text, Values::Text(texts))])?;
-    Ok(writer.commit()?)
+    writer.commit()
 }
 
 /// Key-value metadata that makes the text the index of the table in pandas: `LeRobot` takes a task's text from there,

@@ -161,7 +161,8 @@ impl TableWriter {
     }
 }
 
-fn properties(parsed: &ParsedSchema, options: WriteOptions) -> WriterProperties {
+/// How a file is written.
+pub(super) fn properties(parsed: &ParsedSchema, options: WriteOptions) -> WriterProperties {
     let mut builder =
         WriterProperties::builder().set_created_by(CREATED_BY.to_owned()).set_compression(Compression::SNAPPY);
     builder = builder.set_data_page_size_limit(PAGE_BYTES);

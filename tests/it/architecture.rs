@@ -28,6 +28,7 @@ const ORDER: [&str; 23] = [
     "report",
     "query",
     "pipeline",
+    "lineage",
     "cli",
 ];
 

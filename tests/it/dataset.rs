@@ -64,7 +64,7 @@ pub(crate) fn densify(episode: &Episode, n_between: u32) -> Episode {
     Episode::new(parts).unwrap()
 }
 
-fn failed(episode: &Episode) -> Episode {
+pub(crate) fn failed(episode: &Episode) -> Episode {
     let mut parts = episode.clone().into_parts();
     parts.outcome = Outcome::Failure(Cause::MissedGrasp);
     Episode::new(parts).unwrap()
@@ -352,7 +352,7 @@ fn statistics_are_exact() {
 }
 
 /// Writes a table again after a change of its columns.
-fn rewrite(root: &Path, file: &str, schema: &TableSchema, change: impl FnOnce(&mut Vec<(String, Column)>)) {
+pub(crate) fn rewrite(root: &Path, file: &str, schema: &TableSchema, change: impl FnOnce(&mut Vec<(String, Column)>)) {
     let path = root.join(file);
     let mut columns = table::read(&path, schema).unwrap().into_inner();
     change(&mut columns);

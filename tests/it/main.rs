@@ -9,9 +9,13 @@ mod cli;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
+mod dataset_edit;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod kinematic;
+#[cfg(test)]
+mod lineage;
 #[cfg(test)]
 mod model;
 #[cfg(test)]

@@ -1,0 +1,123 @@
+//! `ntp dataset merge | filter | split | diff`: datasets of datasets.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::cli::{DatasetCommand, DiffArgs, FilterArgs, MergeArgs, SplitArgs};
+use crate::commands::{CommandOutcome, UsageError, output};
+use crate::dataset::edit::{
+    ChangedEpisode, Condition, Difference, EditSummary, EpisodeName, SplitBy, Unit, diff, filter, merge, split,
+};
+
+pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
+    match command {
+        DatasetCommand::Merge(args) => run_merge(args),
+        DatasetCommand::Filter(args) => run_filter(args),
+        DatasetCommand::Split(args) => run_split(args),
+        DatasetCommand::Diff(args) => run_diff(args),
+    }
+}
+
+fn run_merge(args: &MergeArgs) -> anyhow::Result<CommandOutcome> {
+    let summary = merge(&args.sources, &args.to)?;
+    tell(&[(&args.to, &summary)], args.json)
+}
+
+fn run_filter(args: &FilterArgs) -> anyhow::Result<CommandOutcome> {
+    let condition = Condition {
+        tasks: args.task.clone(),
+        families: args.family.clone(),
+        programs: args.program.clone(),
+        outcomes: args.outcome.clone(),
+        split: args.split,
+        min_frames: args.min_frames,
+        max_frames: args.max_frames,
+    };
+    if condition == Condition::default() {
+        return Err(UsageError(
+            "filter needs a condition, e.g. --split seen; see ntp dataset filter --help".to_owned(),
+        )
+        .into());
+    }
+    let summary = filter(&args.dataset, &condition, &args.to)?;
+    tell(&[(&args.to, &summary)], args.json)
+}
+
+fn run_split(args: &SplitArgs) -> anyhow::Result<CommandOutcome> {
+    let by = match args.by.as_deref() {
+        Some("split") => SplitBy::Split,
+        Some("task") => SplitBy::Task,
+        Some("family") => SplitBy::Family,
+        Some(_) => SplitBy::Outcome,
+        None => SplitBy::Shares {
+            parts: args.shares.iter().map(|part| share(part)).collect::<Result<_, _>>()?,
+            unit: if args.unit == "episode" { Unit::Episode } else { Unit::Task },
+            seed: args.seed,
+        },
+    };
+    let parts = split(&args.dataset, &by, &args.to)?;
+    let parts: Vec<_> = parts.into_iter().map(|(name, summary)| (args.to.join(name), summary)).collect();
+    tell(&parts.iter().map(|(path, summary)| (path.as_path(), summary)).collect::<Vec<_>>(), args.json)
+}
+
+fn share(part: &str) -> Result<(String, f64), UsageError> {
+    let wrong = || UsageError(format!("--shares: {part:?} is not NAME=SHARE, e.g. train=0.8"));
+    let (name, share) = part.split_once('=').ok_or_else(wrong)?;
+    Ok((name.to_owned(), share.parse().map_err(|_number| wrong())?))
+}
+
+fn tell(written: &[(&Path, &EditSummary)], as_json: bool) -> anyhow::Result<CommandOutcome> {
+    if as_json {
+        let written: Vec<_> =
+            written.iter().map(|(path, summary)| json!({ "path": path, "summary": summary })).collect();
+        output::print_json(&json!({ "written": written }))?;
+        return Ok(CommandOutcome::Done);
+    }
+    let line = |(path, of): &(&Path, &EditSummary)| {
+        let left_out = if of.left_out > 0 { format!(", {} left out", of.left_out) } else { String::new() };
+        let EditSummary { episodes, frames, calls, tasks, .. } = of;
+        format!("{}: {episodes} episodes{left_out}, {tasks} tasks, {frames} frames, {calls} calls", path.display())
+    };
+    output::print(&written.iter().map(line).collect::<Vec<_>>().join("\n"))?;
+    Ok(CommandOutcome::Done)
+}
+
+fn run_diff(args: &DiffArgs) -> anyhow::Result<CommandOutcome> {
+    let found = diff(&args.before, &args.after)?;
+    if args.json {
+        output::print_json(&found)?;
+    } else {
+        output::print(&diff_text(&found))?;
+    }
+    Ok(if found.is_none() { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}
+
+fn diff_text(found: &Difference) -> String {
+    let name = |of: &EpisodeName| {
+        format!("episode {} ({}, {} of {})", of.episode_index, of.task_id, of.recording_index, of.recording)
+    };
+    let mut lines: Vec<String> = found.settings.iter().map(|line| format!("setting  {line}")).collect();
+    lines.extend(found.removed_episodes.iter().map(|of| format!("removed  {}", name(of))));
+    lines.extend(found.added_episodes.iter().map(|of| format!("added    {}", name(of))));
+    lines.extend(found.changed_episodes.iter().map(|of| format!("changed  {}: {}", name(&of.before), changes(of))));
+    let Difference { same, moved, removed, added, changed, .. } = found;
+    lines.push(format!("{same} the same ({moved} of them moved), {removed} removed, {added} added, {changed} changed"));
+    lines.join("\n")
+}
+
+fn changes(of: &ChangedEpisode) -> String {
+    let mut parts = Vec::new();
+    if !of.episode_columns.is_empty() {
+        parts.push(of.episode_columns.join(", "));
+    }
+    if !of.calls.is_empty() {
+        let ids: Vec<String> = of.calls.iter().map(ToString::to_string).collect();
+        parts.push(format!("calls {}", ids.join(", ")));
+    }
+    if of.scopes > 0 {
+        parts.push(format!("{} scoping labels", of.scopes));
+    }
+    parts.extend(of.frames.iter().map(|(column, frames)| format!("{column} in {frames} frames")));
+    parts.join("; ")
+}

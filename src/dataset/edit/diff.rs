@@ -1,0 +1,135 @@
+//! What differs between two datasets.
+//!
+//! Episodes are the same when they come from the same place of the same recording. They are compared by hashes of
+//! their rows, without what counts only where they lie; those that differ are then read again and told apart.
+
+mod detail;
+mod digest;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::dataset::edit::EditError;
+use crate::dataset::edit::source::Source;
+use detail::details;
+use digest::{EpisodeDigest, digests};
+
+/// Differing episodes that are told in detail, and of episodes in one dataset alone.
+const MAX_TOLD: usize = 100;
+
+/// An episode by where it lies and where it comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct EpisodeName {
+    /// Its number in its dataset.
+    pub episode_index: i64,
+    /// Its task.
+    pub task_id: String,
+    /// The recording that it comes from.
+    pub recording: String,
+    /// Its place there.
+    pub recording_index: i64,
+}
+
+/// An episode that is in both, but not the same.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ChangedEpisode {
+    /// As it is in the first dataset.
+    pub before: EpisodeName,
+    /// Its number in the second.
+    pub after_index: i64,
+    /// Names of the columns of `ntp/episodes.parquet` that differ.
+    pub episode_columns: Vec<String>,
+    /// Ids of the calls that differ, or are in one alone.
+    pub calls: Vec<i64>,
+    /// How many scoping labels differ, or are in one alone.
+    pub scopes: u64,
+    /// By column of `data/`, in how many frames it differs. `rows` counts frames that are in one alone.
+    pub frames: BTreeMap<String, u64>,
+}
+
+/// What differs between two datasets.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Episodes that are the same in both.
+    pub same: u64,
+    /// How many of these have another number.
+    pub moved: u64,
+    /// Episodes that are in the first one alone.
+    pub removed: u64,
+    /// Episodes that are in the second one alone.
+    pub added: u64,
+    /// Episodes that are in both and differ.
+    pub changed: u64,
+    /// The first hundred of each.
+    pub removed_episodes: Vec<EpisodeName>,
+    /// The same of those added.
+    pub added_episodes: Vec<EpisodeName>,
+    /// The same of those changed.
+    pub changed_episodes: Vec<ChangedEpisode>,
+    /// What else differs: rows per second, features, slots.
+    pub settings: Vec<String>,
+}
+
+impl Difference {
+    /// Whether nothing differs. Episodes may lie in another order.
+    pub fn is_none(&self) -> bool {
+        self.removed + self.added + self.changed == 0 && self.settings.is_empty()
+    }
+}
+
+/// Compares two datasets.
+///
+/// Memory grows with the number of episodes: some 80 bytes each.
+///
+/// # Errors
+///
+/// When one of them cannot be read.
+pub fn diff(before: &Path, after: &Path) -> Result<Difference, EditError> {
+    let settings = other_settings(&Source::open(before)?, &Source::open(after)?);
+    let (first, second) = (digests(before)?, digests(after)?);
+    let index = |digests: &[EpisodeDigest]| -> BTreeMap<[u64; 2], usize> {
+        digests.iter().enumerate().map(|(at, digest)| (digest.identity, at)).collect()
+    };
+    let (in_first, in_second) = (index(&first), index(&second));
+    let alone = |digests: &[EpisodeDigest], others: &BTreeMap<[u64; 2], usize>| -> Vec<usize> {
+        (0..digests.len()).filter(|&at| !others.contains_key(&digests[at].identity)).collect()
+    };
+    let (removed, added) = (alone(&first, &in_second), alone(&second, &in_first));
+    let pairs: Vec<(usize, usize)> =
+        first.iter().enumerate().filter_map(|(at, digest)| Some((at, *in_second.get(&digest.identity)?))).collect();
+    let changed: Vec<(usize, usize)> =
+        pairs.iter().copied().filter(|&(a, b)| first[a].content != second[b].content).collect();
+    let moved = pairs.iter().filter(|(a, b)| a != b && first[*a].content == second[*b].content).count() as u64;
+    let told: Vec<(usize, usize)> = changed.iter().copied().take(MAX_TOLD).collect();
+    Ok(Difference {
+        same: (pairs.len() - changed.len()) as u64,
+        moved,
+        removed: removed.len() as u64,
+        added: added.len() as u64,
+        changed: changed.len() as u64,
+        removed_episodes: detail::names(before, &removed[..removed.len().min(MAX_TOLD)])?,
+        added_episodes: detail::names(after, &added[..added.len().min(MAX_TOLD)])?,
+        changed_episodes: details(before, after, &told)?,
+        settings,
+    })
+}
+
+fn other_settings(before: &Source, after: &Source) -> Vec<String> {
+    let of = |source: &Source| {
+        let features: BTreeMap<_, _> = source.info.features.0.iter().cloned().collect();
+        [
+            ("fps", format!("{}", source.info.fps)),
+            ("frames", source.ntp.frames.clone()),
+            ("n_slots", format!("{}", source.ntp.n_slots)),
+            ("vocabulary_hash", source.ntp.vocabulary_hash.clone()),
+            (
+                "features",
+                format!("{:?}", features.iter().map(|(name, of)| (name, of.dtype, &of.shape)).collect::<Vec<_>>()),
+            ),
+        ]
+    };
+    let pairs = of(before).into_iter().zip(of(after));
+    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).collect()
+}

@@ -1,0 +1,67 @@
+//! What is written of a dataset at its end: the last rows, texts, totals and statistics.
+
+use crate::artifact::write_json;
+use crate::dataset::edit::EditError;
+use crate::dataset::edit::target::{EditSummary, Target};
+use crate::dataset::feature::FEATURES;
+use crate::dataset::info::{FeatureInfo, Features, Info, NtpInfo, Stats, declared};
+use crate::dataset::layout;
+use crate::dataset::text_files::{write_subtasks, write_tasks};
+
+impl Target {
+    /// Ends the dataset. `failed_left_out` is what its sources left out of their recordings.
+    pub(in crate::dataset::edit) fn finish(mut self, failed_left_out: u64) -> Result<EditSummary, EditError> {
+        self.write_episodes()?;
+        self.write_calls()?;
+        self.write_scopes()?;
+        write_tasks(&self.root, self.tasks.texts())?;
+        write_subtasks(&self.root, self.subtasks.texts())?;
+        let slots = self.slots.take().unwrap_or_default();
+        write_json(&self.root.join(layout::INFO), &self.info(&slots))?;
+        write_json(&self.root.join(layout::NTP_INFO), &self.ntp_info(slots, failed_left_out))?;
+        let Self { root, tasks, statistics, mut summary, .. } = self;
+        let single = [layout::INFO, layout::STATS, layout::TASKS, layout::SUBTASKS, layout::NTP_INFO, layout::EPISODES];
+        let mut files: Vec<String> = single.map(ToOwned::to_owned).into();
+        for table in [self.frame_files, self.call_files, self.scope_files, self.meta_files] {
+            files.extend(table.finish()?);
+        }
+        self.provenance_file.commit()?;
+        write_json(&root.join(layout::STATS), &Stats(statistics.finish()?))?;
+        files.sort_unstable();
+        summary.tasks = tasks.texts().len() as u64;
+        summary.files = files;
+        Ok(summary)
+    }
+
+    fn info(&self, slots: &[String]) -> Info {
+        let total_episodes = self.summary.episodes;
+        Info {
+            total_episodes,
+            total_frames: self.summary.frames,
+            total_tasks: self.tasks.texts().len() as u64,
+            splits: [("train".to_owned(), format!("0:{total_episodes}"))].into(),
+            features: self.declared_features(slots),
+            ..self.info.clone()
+        }
+    }
+
+    /// Features of ours in the order of their columns, then any others.
+    fn declared_features(&self, slots: &[String]) -> Features {
+        let is_ours = |name: &str| FEATURES.iter().any(|feature| feature.name == name);
+        let others = self.info.features.0.iter().filter(|(name, _)| !is_ours(name)).cloned();
+        let features: Vec<(String, FeatureInfo)> = FEATURES.iter().map(|feature| declared(feature, slots)).collect();
+        Features(features.into_iter().chain(others).collect())
+    }
+
+    fn ntp_info(&self, slots: Vec<String>, failed_left_out: u64) -> NtpInfo {
+        NtpInfo {
+            ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
+            families: self.families.iter().map(|family| family.name().to_owned()).collect(),
+            slots,
+            total_calls: self.summary.calls,
+            total_scopes: self.summary.scopes,
+            failed_left_out,
+            ..self.ntp.clone()
+        }
+    }
+}

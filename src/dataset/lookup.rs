@@ -1,0 +1,230 @@
+//! One episode of a dataset, and one of its frames: where it lies, what runs there, where it comes from.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::dataset::DatasetError;
+use crate::dataset::call_rows::read_calls;
+use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::layout::{self, EPISODES, FilePlace};
+use crate::dataset::schema::{CALLS, FRAMES};
+use crate::table::{Columns, TableError};
+use crate::trace::{ProgramCall, Span};
+
+/// An episode as `ntp/episodes.parquet` and `ntp/calls/` have it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EpisodeFacts {
+    /// Its number in the dataset.
+    pub episode_index: i64,
+    /// Its task.
+    pub task_id: String,
+    /// The task in words.
+    pub task_text: String,
+    /// The task's family.
+    pub family: String,
+    /// The task's split.
+    pub split: String,
+    /// Which trial of the task.
+    pub trial: i64,
+    /// Who acted.
+    pub actor: String,
+    /// How it ended.
+    pub outcome: String,
+    /// How many frames.
+    pub n_frames: i64,
+    /// The file of its frames, relative to the dataset.
+    pub data_file: String,
+    /// `index` of its first frame.
+    pub first_index: i64,
+    /// The recording's name.
+    pub recording: String,
+    /// The recording's SHA-256.
+    pub recording_sha256: String,
+    /// Its number in its recordings.
+    pub recording_index: i64,
+    /// Every call, callers before callees.
+    pub calls: Vec<CallFacts>,
+}
+
+/// One program call.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CallFacts {
+    /// Its number in the episode.
+    pub call_id: u32,
+    /// Who called it.
+    pub caller_id: Option<u32>,
+    /// 0 for the root.
+    pub depth: u8,
+    /// What was called.
+    pub program: String,
+    /// The slot that it was called with.
+    pub argument: Option<String>,
+    /// The frames of the specification that its caller saw, half-open.
+    pub input: [u32; 2],
+    /// Those that it may see itself.
+    pub output: Option<[u32; 2]>,
+    /// The episode's frames from call to return.
+    pub frames: [u32; 2],
+}
+
+/// One frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameFacts {
+    /// Its number in the episode.
+    pub frame_index: i64,
+    /// Its number in the dataset.
+    pub index: i64,
+    /// Its number among the recorded frames of the episode.
+    pub recording_frame: i64,
+    /// Simulated time.
+    pub time_secs: f64,
+    /// Whether a primitive has just ended, or the episode begins.
+    pub is_boundary: bool,
+    /// The path of running programs, as the frame's label has it.
+    pub program: String,
+    /// The calls that go on from it, the root first.
+    pub stack: Vec<CallFacts>,
+}
+
+struct FrameBatch {
+    index: Vec<i64>,
+    recording_frame: Vec<i64>,
+    time_secs: Vec<f64>,
+    boundary: Vec<bool>,
+    call_id: Vec<i64>,
+    program: Vec<String>,
+}
+
+impl Batch for FrameBatch {
+    const COLUMNS: &'static [&'static str] =
+        &["index", "ntp.recording_frame", "ntp.time_secs", "ntp.boundary", "ntp.call_id", "ntp.program"];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            index: columns.int64("index")?,
+            recording_frame: columns.int64("ntp.recording_frame")?,
+            time_secs: columns.float64("ntp.time_secs")?,
+            boundary: columns.boolean("ntp.boundary")?,
+            call_id: columns.int64("ntp.call_id")?,
+            program: columns.text("ntp.program")?,
+        })
+    }
+}
+
+/// Looks up an episode, and one of its frames when it is asked for.
+///
+/// # Errors
+///
+/// When there is no such episode or frame, with how many there are; or a table cannot be read.
+pub fn look_up(
+    root: &Path,
+    episode: u64,
+    frame: Option<u64>,
+) -> Result<(EpisodeFacts, Option<FrameFacts>), DatasetError> {
+    let found = find(root, episode)?;
+    let mut cursor = Cursor::new(root, layout::CALLS, CALLS);
+    for _ in 0..found.calls_before {
+        cursor.next(found.row.calls)?;
+    }
+    let mut calls = Vec::new();
+    read_calls(&mut cursor, &found.row, &mut calls)?;
+    let calls: Vec<CallFacts> = calls.iter().map(|call| call_facts(call, &found.row)).collect();
+    let frame = frame.map(|frame| find_frame(root, &found, &calls, frame)).transpose()?;
+    Ok((episode_facts(found.row, calls), frame))
+}
+
+/// An episode, and how many rows lie before its own in the files of calls and frames.
+struct Found {
+    row: EpisodeRow,
+    calls_before: i64,
+    frames_before: i64,
+}
+
+fn find(root: &Path, episode: u64) -> Result<Found, DatasetError> {
+    let (info, rows) = EpisodeRows::open(root)?;
+    let (mut calls, mut frames) = ((None, 0), (None, 0));
+    for row in rows {
+        let row = row?;
+        // Where a file begins, rows are counted anew.
+        let first = |known: (Option<FilePlace>, i64), place: FilePlace, first: i64| {
+            if known.0 == Some(place) { known } else { (Some(place), first) }
+        };
+        calls = first(calls, row.calls, row.first_call);
+        frames = first(frames, row.data, row.first_index);
+        if row.episode_index.unsigned_abs() == episode {
+            let (calls_before, frames_before) = (row.first_call - calls.1, row.first_index - frames.1);
+            return Ok(Found { row, calls_before, frames_before });
+        }
+    }
+    let problem = format!("there is no episode {episode}; there are {}, counted from 0", info.total_episodes);
+    Err(DatasetError::Count { path: root.join(EPISODES), problem })
+}
+
+fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Result<FrameFacts, DatasetError> {
+    let row = &found.row;
+    if frame >= row.n_frames.unsigned_abs() {
+        let problem = format!("there is no frame {frame}; it has {}, counted from 0", row.n_frames);
+        return Err(DatasetError::Episode { path: root.join(EPISODES), episode: row.episode_index, problem });
+    }
+    let mut cursor = Cursor::<FrameBatch>::new(root, layout::DATA, FRAMES);
+    for _ in 0..found.frames_before + frame as i64 {
+        cursor.next(row.data)?;
+    }
+    let (batch, at) = cursor.next(row.data)?;
+    Ok(FrameFacts {
+        frame_index: frame as i64,
+        index: batch.index[at],
+        recording_frame: batch.recording_frame[at],
+        time_secs: batch.time_secs[at],
+        is_boundary: batch.boundary[at],
+        program: batch.program[at].clone(),
+        stack: stack(calls, batch.call_id[at]),
+    })
+}
+
+/// A call with all its callers, the root first.
+fn stack(calls: &[CallFacts], deepest: i64) -> Vec<CallFacts> {
+    let of = |id: u32| calls.get(id as usize);
+    let first = u32::try_from(deepest).ok().and_then(of);
+    // A caller comes before what it calls: a broken tree ends the walk.
+    let caller = |call: &&CallFacts| call.caller_id.filter(|&caller| caller < call.call_id).and_then(of);
+    let mut stack: Vec<CallFacts> = std::iter::successors(first, caller).cloned().collect();
+    stack.reverse();
+    stack
+}
+
+fn call_facts(call: &ProgramCall, row: &EpisodeRow) -> CallFacts {
+    let ends = |span: Span| [span.begin, span.end];
+    CallFacts {
+        call_id: call.id.0,
+        caller_id: call.caller.map(|caller| caller.0),
+        depth: call.depth,
+        program: call.program.name().to_owned(),
+        argument: call.argument.and_then(|slot| row.slots.get(usize::from(slot.0)).cloned()),
+        input: ends(call.input),
+        output: call.output.map(ends),
+        frames: ends(call.frames),
+    }
+}
+
+fn episode_facts(row: EpisodeRow, calls: Vec<CallFacts>) -> EpisodeFacts {
+    EpisodeFacts {
+        episode_index: row.episode_index,
+        task_id: row.task_id,
+        task_text: row.task_text,
+        family: row.family,
+        split: row.split,
+        trial: row.trial,
+        actor: row.actor,
+        outcome: row.outcome,
+        n_frames: row.n_frames,
+        data_file: row.data.relative(layout::DATA),
+        first_index: row.first_index,
+        recording: row.recording,
+        recording_sha256: row.recording_sha256,
+        recording_index: row.recording_index,
+        calls,
+    }
+}

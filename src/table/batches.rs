@@ -1,0 +1,93 @@
+//! Tables as Arrow batches, every column of them: for what is carried from file to file as it is.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::RecordBatch;
+use arrow::datatypes::{Schema, SchemaRef};
+use parquet::arrow::ArrowSchemaConverter;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_writer::{ArrowWriter, ArrowWriterOptions};
+
+use crate::artifact::{AtomicFile, IoError};
+use crate::table::guard::guarded;
+use crate::table::schema::ParsedSchema;
+use crate::table::write::{WriteOptions, properties};
+use crate::table::{ColumnKind, TableError};
+
+/// Reads every column of a file.
+pub(crate) struct BatchReader {
+    path: PathBuf,
+    schema: SchemaRef,
+    reader: ParquetRecordBatchReader,
+}
+
+impl BatchReader {
+    /// Opens a file, to be read in batches of so many rows.
+    pub(crate) fn open(path: &Path, batch_rows: usize) -> Result<Self, TableError> {
+        guarded(path, || {
+            let file = File::open(path).map_err(IoError::system("open", path))?;
+            let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(TableError::parquet(path))?;
+            let schema = Arc::clone(builder.schema());
+            let reader = builder.with_batch_size(batch_rows).build().map_err(TableError::parquet(path))?;
+            Ok(Self { path: path.to_owned(), schema, reader })
+        })
+    }
+
+    /// Its columns and metadata.
+    pub(crate) fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// The next rows; `None` at the end.
+    pub(crate) fn next_batch(&mut self) -> Result<Option<RecordBatch>, TableError> {
+        let (path, reader) = (&self.path, &mut self.reader);
+        guarded(path, || reader.next().transpose().map_err(TableError::arrow(path)))
+    }
+}
+
+/// Writes batches, each a row group. Dropped without [`BatchWriter::commit`] it leaves nothing.
+pub(crate) struct BatchWriter {
+    path: PathBuf,
+    writer: ArrowWriter<AtomicFile>,
+}
+
+impl BatchWriter {
+    /// Begins a file with the columns and the metadata of an Arrow schema. `name` is that of Parquet's message.
+    pub(crate) fn create(path: &Path, name: &str, schema: &Schema, options: WriteOptions) -> Result<Self, TableError> {
+        let failed = TableError::parquet(path);
+        let descriptor = ArrowSchemaConverter::new().schema_root(name).convert(schema).map_err(&failed)?;
+        let fields = descriptor.root_schema().get_fields().iter();
+        let columns = fields.filter_map(|field| Some((field.name().to_owned(), ColumnKind::of(field)?))).collect();
+        let mut all = options;
+        all.metadata.extend(schema.metadata().iter().map(|(key, value)| (key.clone(), value.clone())));
+        all.metadata.sort_unstable();
+        let parsed = ParsedSchema { descriptor, arrow: schema.clone(), columns };
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties(&parsed, all))
+            .with_skip_arrow_metadata(true)
+            .with_parquet_schema(parsed.descriptor);
+        let file = AtomicFile::create(path)?;
+        let writer = ArrowWriter::try_new_with_options(file, Arc::new(parsed.arrow), options).map_err(&failed)?;
+        Ok(Self { path: path.to_owned(), writer })
+    }
+
+    /// Writes rows as a row group.
+    pub(crate) fn write(&mut self, batch: &RecordBatch) -> Result<(), TableError> {
+        let failed = TableError::parquet(&self.path);
+        self.writer.write(batch).map_err(&failed)?;
+        self.writer.flush().map_err(&failed)
+    }
+
+    /// Size of what has been written, in bytes.
+    pub(crate) fn bytes_written(&self) -> usize {
+        self.writer.bytes_written()
+    }
+
+    /// Ends the file and gives it its name.
+    pub(crate) fn commit(self) -> Result<(), TableError> {
+        let file = self.writer.into_inner().map_err(TableError::parquet(&self.path))?;
+        Ok(file.commit()?)
+    }
+}
