@@ -16,6 +16,7 @@ const ORDER: &[&str] = &[
     "task",
     "trace",
     "render",
+    "video",
     "robot",
     "sim",
     "expert",

@@ -49,4 +49,6 @@ mod trace;
 #[cfg(test)]
 mod training;
 #[cfg(test)]
+mod video;
+#[cfg(test)]
 mod visualize;
