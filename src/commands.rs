@@ -8,6 +8,7 @@ mod inspect;
 mod kind;
 mod output;
 mod query;
+mod render;
 mod replay;
 mod stages;
 mod tasks;
@@ -82,6 +83,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Render(args) => render::run(args),
         Command::Query(args) => query::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Dataset(command) => dataset::run(command),

@@ -56,7 +56,7 @@ fn verify(args: &ReplayArgs, plan: &Plan, episode: &Episode) -> anyhow::Result<C
 }
 
 /// The episode of a number, counted through the recording, or through the recordings of a folder in order of names.
-fn find(path: &Path, episode: u64) -> anyhow::Result<(PathBuf, Plan, Episode)> {
+pub(super) fn find(path: &Path, episode: u64) -> anyhow::Result<(PathBuf, Plan, Episode)> {
     let files = recordings(path)?;
     let mut n_episodes = 0;
     for file in &files {
