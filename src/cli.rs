@@ -49,6 +49,8 @@ pub enum Command {
     Validate(PathArgs),
     /// Show episodes in Rerun, rollouts beside their demonstrations, or simulate them again.
     Replay(ReplayArgs),
+    /// Draw an episode of a recording as a video, moving pictures or one picture.
+    Render(RenderArgs),
     /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
     Query(QueryArgs),
     /// Say where an episode, a frame or a model comes from.
@@ -162,6 +164,40 @@ pub struct ReplayArgs {
     /// Simulate it again from its seed and compare every frame.
     #[arg(long)]
     pub verify: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// A recording (.mcap), or a folder of recordings or rollouts.
+    pub path: PathBuf,
+    /// Which episode, by its number.
+    #[arg(long, value_name = "K")]
+    pub episode: u64,
+    /// From where: front or wrist.
+    #[arg(long, value_name = "NAME", default_value = "front", value_parser = ["front", "wrist"])]
+    pub camera: String,
+    /// Width and height in pixels: one even number, or two as 640x480.
+    #[arg(long, value_name = "PIXELS", default_value = "480")]
+    pub size: String,
+    /// Pictures a second.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=60))]
+    pub fps: u32,
+    /// With --png: which recorded frame [default: the last].
+    #[arg(long, value_name = "N", requires = "png")]
+    pub frame: Option<usize>,
+    /// Write a video.
+    #[arg(long, value_name = "FILE", group = "output", required_unless_present_any = ["gif", "png"])]
+    pub mp4: Option<PathBuf>,
+    /// Write moving pictures for pages.
+    #[arg(long, value_name = "FILE", group = "output")]
+    pub gif: Option<PathBuf>,
+    /// Write one picture.
+    #[arg(long, value_name = "FILE", group = "output")]
+    pub png: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -9,6 +9,7 @@ mod kind;
 mod output;
 mod publish;
 mod query;
+mod render;
 mod repair;
 mod replay;
 mod stages;
@@ -89,6 +90,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Render(args) => render::run(args),
         Command::Query(args) => query::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Repair(args) => repair::run(args),

@@ -31,6 +31,7 @@ pub mod sim;
 pub mod task;
 pub mod trace;
 pub mod training;
+pub mod video;
 pub mod visualize;
 
 pub mod cli;

@@ -12,6 +12,7 @@
 //! | `/tf` | `foxglove.FrameTransforms` | each frame: gripper, and bodies that moved; the first frame: all |
 //! | `/ntp/observation` | `ntp.v1.Observation` | each frame: what is not a pose |
 //! | `/ntp/call`, `/ntp/return` | `ntp.v1.ProgramCall`, `ProgramReturn` | each program call and its return |
+//! | `/camera/NAME/image` or `/video`, `/calibration`, `/tf` | `foxglove.*` | what cameras saw, if there are any |
 //! | `/ntp/stack`, `/ntp/event`, `/scene`, `/log` | `ntp.v1.ProgramStack`, `foxglove.*` | for viewers alone |
 //!
 //! # Units and frames
@@ -30,6 +31,7 @@
 
 mod assembler;
 mod calls;
+mod cameras;
 mod container;
 mod error;
 mod events;
@@ -46,9 +48,10 @@ mod viewer;
 mod wire;
 mod writer;
 
+pub use cameras::{CameraPictures, Pictured};
 pub use error::{Damage, EpisodeProblem, MessageProblem, RecordingError};
 pub use events::EventWriter;
 pub use inspect::{RecordingInspection, TopicInspection, inspect};
-pub use reader::{BoundaryReader, ShardReader};
+pub use reader::{BoundaryReader, PicturedBoundaryReader, PicturedReader, ShardReader};
 pub use repair::{PlanSource, RecordingRepair, repair};
 pub use writer::{ShardSummary, ShardWriter};

@@ -15,6 +15,7 @@
 //! drawn before. Everything that is there is drawn, also bodies that no slot shows.
 
 mod camera;
+mod config;
 mod look;
 mod mesh;
 mod model;
@@ -28,6 +29,7 @@ mod texture;
 mod view;
 
 pub use camera::{Camera, Mount, looking_at};
+pub use config::{CameraConfig, CameraError, PictureFormat, PictureQuality, Viewpoint};
 pub use look::{Light, Look, Shadows};
 pub use picture::{Picture, Segment};
 pub use randomize::Randomization;

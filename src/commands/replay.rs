@@ -106,6 +106,12 @@ impl Found {
     }
 }
 
+/// The recording that an episode is in, and the episode; counted as [`find`] does.
+pub(super) fn find_one(path: &Path, number: u64) -> anyhow::Result<(PathBuf, Episode)> {
+    let found = find(path, &[number])?.into_iter().next().context("an episode that was found")?;
+    Ok((found.file, found.episode))
+}
+
 /// The episodes of some numbers, counted through the recording, or through the recordings of a folder in order of
 /// names.
 fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {

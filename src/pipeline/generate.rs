@@ -59,7 +59,8 @@ fn work_shard(
     }
     let name = format!("shard-{shard:05}-of-{:05}.mcap", unit.plan.shards);
     let plan_json = serde_json::to_string(&unit.plan).unwrap_or_default();
-    let mut writer = ShardWriter::create(&unit.dir.path().join(&name), &plan_json)?;
+    let writer = ShardWriter::create(&unit.dir.path().join(&name), &plan_json)?;
+    let mut writer = writer.with_cameras(&spec.cameras);
     let mut failed = 0;
     for index in range.clone() {
         context.go_on()?;

@@ -112,6 +112,15 @@ impl Pipeline {
         if let Err(problem) = generate.simulation.check() {
             return Err(self.value("generate.simulation", problem.to_string()));
         }
+        for (position, camera) in generate.cameras.iter().enumerate() {
+            let key = format!("generate.cameras[{position}]");
+            if let Err(problem) = camera.check() {
+                return Err(self.value(&key, problem.to_string()));
+            }
+            if generate.cameras[..position].iter().any(|other| other.name == camera.name) {
+                return Err(self.value(&key, format!("camera {} is named twice", camera.name)));
+            }
+        }
         self.check_counts("generate.counts", generate.counts)
     }
 

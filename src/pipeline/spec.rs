@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::ConvertConfig;
 use crate::model::{Decoder, Variant};
+use crate::render::CameraConfig;
 use crate::sim::{AdversaryConfig, SimulationConfig};
 use crate::task::{Family, Split};
 use crate::trace::SpecificationForm;
@@ -89,6 +90,9 @@ pub struct GenerateSpec {
     pub counts: Option<CountsSpec>,
     /// The physics.
     pub simulation: SimulationConfig,
+    /// What films the demonstrations: their pictures come into recordings and dataset.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<CameraConfig>,
 }
 
 impl Default for GenerateSpec {
@@ -99,6 +103,7 @@ impl Default for GenerateSpec {
             frames: RecordedFrames::default(),
             counts: None,
             simulation: SimulationConfig::default(),
+            cameras: Vec::new(),
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use prost::Message as _;
 
+use super::cameras::{CameraPictures, PicturesBeingRead};
 use super::error::MessageProblem;
 use super::observation::Observed;
-use super::schema::{Topic, proto};
+use super::schema::{CameraTopic, Topic, proto};
 use super::start::{self, Start};
 use super::transform::{self, GRIPPER};
 use super::{calls, observation};
@@ -24,12 +25,16 @@ pub(super) enum Keep {
 pub(super) struct Assembled {
     pub(super) parts: EpisodeParts,
     pub(super) recorded: RecordedFrames,
+    /// Of the kept frames; empty when they are not wanted.
+    pub(super) cameras: Vec<CameraPictures>,
 }
 
 /// Episodes being put together, one at a time. Its buffers are used again from message to message.
 #[derive(Default)]
 pub(super) struct Assembler {
     keep: Keep,
+    /// Whether pictures are wanted.
+    pictures: bool,
     building: Option<Box<Building>>,
     call: proto::ProgramCall,
     returned: proto::ProgramReturn,
@@ -55,11 +60,36 @@ struct Building {
     /// Positions of the boundary frames among all.
     boundaries: Vec<u32>,
     calls: Vec<ProgramCall>,
+    pictures: PicturesBeingRead,
 }
 
 impl Assembler {
     pub(super) fn new(keep: Keep) -> Self {
         Self { keep, ..Self::default() }
+    }
+
+    /// With the pictures of the frames that are kept.
+    pub(super) fn with_pictures(self) -> Self {
+        Self { pictures: true, ..self }
+    }
+
+    /// Whether pictures are wanted.
+    pub(super) fn wants_pictures(&self) -> bool {
+        self.pictures
+    }
+
+    /// Takes a message of a camera.
+    pub(super) fn camera_message(
+        &mut self,
+        camera: &str,
+        topic: CameraTopic,
+        data: &[u8],
+    ) -> Result<(), MessageProblem> {
+        let building = self.building.as_mut().ok_or(MessageProblem::OutOfPlace("no episode has started"))?;
+        let n_frames = building.times_nanos.len();
+        let is_boundary = building.boundaries.last().is_some_and(|&last| last as usize + 1 == n_frames);
+        let is_kept = building.keep == Keep::All || is_boundary;
+        building.pictures.message(camera, topic, data, n_frames, is_kept)
     }
 
     /// Whether an episode has begun and not ended.
@@ -105,7 +135,7 @@ impl Assembler {
                 let end = proto::EpisodeEnd::decode(data)?;
                 building.check_end(&end)?;
                 let outcome = decode_outcome(&end)?;
-                return Ok(self.building.take().map(|building| building.assembled(outcome)));
+                return self.building.take().map(|building| building.assembled(outcome)).transpose();
             }
             Topic::EpisodeStart | Topic::Stack | Topic::Scene | Topic::Event | Topic::Log => {}
         }
@@ -137,6 +167,7 @@ impl Building {
             times_nanos: Vec::new(),
             boundaries: Vec::new(),
             calls: Vec::new(),
+            pictures: PicturesBeingRead::default(),
         })
     }
 
@@ -214,15 +245,17 @@ impl Building {
         Ok(())
     }
 
-    fn assembled(self, outcome: Outcome) -> Assembled {
-        let Self { start, frames, times_nanos, boundaries, calls, .. } = self;
+    fn assembled(self, outcome: Outcome) -> Result<Assembled, MessageProblem> {
+        let Self { start, frames, times_nanos, boundaries, calls, pictures, .. } = self;
+        let cameras = pictures.finish(times_nanos.len())?;
         let Start { provenance, scene, specification_frames } = start;
         let recorded = RecordedFrames {
             positions: boundaries,
             count: times_nanos.len() as u32,
             end_nanos: times_nanos.last().copied().unwrap_or(0),
         };
-        Assembled { parts: EpisodeParts { provenance, scene, frames, specification_frames, calls, outcome }, recorded }
+        let parts = EpisodeParts { provenance, scene, frames, specification_frames, calls, outcome };
+        Ok(Assembled { parts, recorded, cameras })
     }
 }
 

@@ -281,6 +281,14 @@ pub enum EpisodeProblem {
         /// The file's.
         expected: &'static str,
     },
+    /// A camera cannot film it.
+    #[error("camera {camera}: {message}")]
+    Camera {
+        /// Its name.
+        camera: String,
+        /// Why.
+        message: String,
+    },
     /// Its times do not fit 64 bits of nanoseconds.
     #[error("its times overflow")]
     TimeOverflow,

@@ -10,7 +10,7 @@ use mcap::records::{ChunkIndex, MessageIndex, Record, Statistics, op};
 
 use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{Damage, RecordingError};
-use super::schema::{SCHEMA_VERSION, Topic};
+use super::schema::{CameraTopic, SCHEMA_VERSION, Topic};
 use super::stream::damaged;
 use super::writer::{METADATA, PLAN};
 use crate::artifact::IoError;
@@ -102,6 +102,12 @@ impl Index {
             _ if self.channels.contains_key(&channel) => Ok(None),
             _ => Err(Damage::UnknownChannel { channel, sequence }),
         }
+    }
+
+    /// The camera and the topic of a channel, if it is a camera's.
+    pub(super) fn camera_topic(&self, channel: u16) -> Option<(&str, CameraTopic)> {
+        let channel = self.channels.get(&channel)?;
+        CameraTopic::from_name(&channel.topic).filter(|(_, topic)| topic.message() == channel.schema)
     }
 
     /// How many episodes there are.

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::assembler::{Assembled, Assembler, Keep};
+use super::cameras::Pictured;
 use super::error::RecordingError;
 use super::index::Index;
 use super::stream::{RawMessage, Stream};
@@ -69,6 +70,12 @@ impl ShardReader {
     #[must_use]
     pub fn boundaries(self) -> BoundaryReader {
         BoundaryReader(Self { assembler: Assembler::new(Keep::Boundaries), ..self })
+    }
+
+    /// Reads also what cameras saw, from the next episode on.
+    #[must_use]
+    pub fn pictured(self) -> PicturedReader {
+        PicturedReader(Self { assembler: self.assembler.with_pictures(), ..self })
     }
 
     /// One episode, by its position in the file from 0. Iteration is not disturbed.
@@ -147,7 +154,40 @@ impl Iterator for BoundaryReader {
     type Item = Result<Boundaries, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.0.next_checked(|Assembled { parts, recorded }| Boundaries::new(parts, recorded))
+        self.0.next_checked(|Assembled { parts, recorded, .. }| Boundaries::new(parts, recorded))
+    }
+}
+
+impl BoundaryReader {
+    /// Reads also what cameras saw at the boundaries, from the next episode on.
+    #[must_use]
+    pub fn pictured(self) -> PicturedBoundaryReader {
+        let Self(reader) = self;
+        PicturedBoundaryReader(ShardReader { assembler: reader.assembler.with_pictures(), ..reader })
+    }
+}
+
+/// A recording whose pictures are read too.
+pub struct PicturedReader(ShardReader);
+
+impl Iterator for PicturedReader {
+    type Item = Result<Pictured<Episode>, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.next_checked(|Assembled { parts, cameras, .. }| Ok(Pictured { episode: Episode::new(parts)?, cameras }))
+    }
+}
+
+/// A recording of which boundary frames are read with their pictures.
+pub struct PicturedBoundaryReader(ShardReader);
+
+impl Iterator for PicturedBoundaryReader {
+    type Item = Result<Pictured<Boundaries>, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.next_checked(|Assembled { parts, recorded, cameras }| {
+            Ok(Pictured { episode: Boundaries::new(parts, recorded)?, cameras })
+        })
     }
 }
 
@@ -169,12 +209,19 @@ fn take(
         offset,
         source,
     })?;
-    let Some(topic) = topic else { return Ok(ControlFlow::Continue(())) };
-    match assembler.message(topic, log_time_nanos, data) {
+    let (topic, taken) = match topic {
+        Some(topic) => (topic.name(), assembler.message(topic, log_time_nanos, data)),
+        None => {
+            let camera = index.camera_topic(channel).filter(|_| assembler.wants_pictures());
+            let Some((camera, topic)) = camera else { return Ok(ControlFlow::Continue(())) };
+            ("/camera", assembler.camera_message(camera, topic, data).map(|()| None))
+        }
+    };
+    match taken {
         Ok(Some(assembled)) => Ok(ControlFlow::Break(assembled)),
         Ok(None) => Ok(ControlFlow::Continue(())),
         Err(problem) => {
-            let (path, topic) = (path.to_owned(), topic.name());
+            let path = path.to_owned();
             Err(RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem })
         }
     }

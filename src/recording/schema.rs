@@ -6,6 +6,7 @@
 
 use super::error::MessageProblem;
 use crate::program::Program;
+use crate::render::PictureFormat;
 
 /// Version of topics and messages. Raised when a reader of the version before could misread.
 pub(super) const SCHEMA_VERSION: u32 = 1;
@@ -104,6 +105,71 @@ impl Topic {
             Self::Scene => descriptor!("foxglove.SceneUpdate"),
             Self::Event => descriptor!("foxglove.Event"),
             Self::Log => descriptor!("foxglove.Log"),
+        }
+    }
+}
+
+/// A topic of a camera: `/camera/NAME/KIND`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum CameraTopic {
+    /// What the camera is.
+    Calibration,
+    /// Where it is.
+    Transform,
+    /// Pictures, each by itself.
+    Image,
+    /// Pictures as a video.
+    Video,
+}
+
+impl CameraTopic {
+    const ALL: [Self; 4] = [Self::Calibration, Self::Transform, Self::Image, Self::Video];
+
+    /// The topic of pictures in a format.
+    pub(super) fn pictures(format: PictureFormat) -> Self {
+        match format {
+            PictureFormat::Png => Self::Image,
+            PictureFormat::H264 => Self::Video,
+        }
+    }
+
+    fn kind(self) -> &'static str {
+        match self {
+            Self::Calibration => "calibration",
+            Self::Transform => "tf",
+            Self::Image => "image",
+            Self::Video => "video",
+        }
+    }
+
+    /// Its name in the file, for the camera of a name.
+    pub(super) fn name(self, camera: &str) -> String {
+        format!("/camera/{camera}/{}", self.kind())
+    }
+
+    /// The camera's name and the topic behind a name in a file.
+    pub(super) fn from_name(topic: &str) -> Option<(&str, Self)> {
+        let (camera, kind) = topic.strip_prefix("/camera/")?.rsplit_once('/')?;
+        Some((camera, Self::ALL.into_iter().find(|topic| topic.kind() == kind)?))
+    }
+
+    /// The full name of its message type.
+    pub(super) fn message(self) -> &'static str {
+        match self {
+            Self::Calibration => "foxglove.CameraCalibration",
+            Self::Transform => "foxglove.FrameTransforms",
+            Self::Image => "foxglove.CompressedImage",
+            Self::Video => "foxglove.CompressedVideo",
+        }
+    }
+
+    /// The self-contained descriptor set of its message type.
+    pub(super) fn descriptor(self) -> &'static [u8] {
+        match self {
+            Self::Calibration => descriptor!("foxglove.CameraCalibration"),
+            Self::Transform => descriptor!("foxglove.FrameTransforms"),
+            Self::Image => descriptor!("foxglove.CompressedImage"),
+            Self::Video => descriptor!("foxglove.CompressedVideo"),
         }
     }
 }

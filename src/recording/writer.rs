@@ -18,13 +18,15 @@ use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use prost::Message;
 
 use super::calls::{self, Step};
+use super::cameras::{Cameras, Filmed};
 use super::container::{MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{EpisodeProblem, RecordingError};
-use super::schema::{SCHEMA_VERSION, Topic, proto};
+use super::schema::{CameraTopic, SCHEMA_VERSION, Topic, proto};
 use super::{observation, start, transform, viewer};
 use crate::artifact::{AtomicFile, IoError};
 use crate::geometry::Pose;
 use crate::program::{Program, vocabulary_hash};
+use crate::render::CameraConfig;
 use crate::task::Family;
 use crate::trace::{Episode, Frame};
 
@@ -58,6 +60,7 @@ pub struct ShardWriter {
     path: PathBuf,
     plan_json: String,
     sink: Sink,
+    cameras: Cameras,
     /// Family of the first episode; all others are of it too.
     family: Option<Family>,
     /// Log time of the next episode's start.
@@ -85,7 +88,8 @@ impl ShardWriter {
         Ok(Self {
             path: path.to_owned(),
             plan_json: plan_json.to_owned(),
-            sink: Sink { mcap, sequences: [0; Topic::ALL.len()], buffer: Vec::new() },
+            sink: Sink { mcap, sequences: vec![0; Topic::ALL.len()], buffer: Vec::new() },
+            cameras: Cameras::default(),
             family: None,
             next_start_nanos: 0,
             summary: ShardSummary::default(),
@@ -97,6 +101,14 @@ impl ShardWriter {
         self.plan_json = plan_json;
     }
 
+    /// Films every episode with these cameras. To be said before the first one is written.
+    #[must_use]
+    pub fn with_cameras(mut self, cameras: &[CameraConfig]) -> Self {
+        self.cameras = Cameras::new(cameras);
+        self.sink.sequences.resize(Topic::ALL.len() + TOPICS_PER_CAMERA * self.cameras.len(), 0);
+        self
+    }
+
     /// Writes one episode behind those before.
     ///
     /// # Errors
@@ -106,11 +118,12 @@ impl ShardWriter {
     pub fn write(&mut self, episode: &Episode) -> Result<(), RecordingError> {
         let times = self.check(episode).map_err(|problem| self.unrecordable(episode, problem))?;
         let steps = calls::steps(&episode.calls).map_err(|problem| self.unrecordable(episode, problem))?;
+        let filmed = self.cameras.film(episode).map_err(|problem| self.unrecordable(episode, problem))?;
         if self.family.is_none() {
             self.family = Some(episode.provenance.family);
             self.declare()?;
         }
-        self.sink.episode(&times, episode, &steps).map_err(|error| failed(&self.path, error))?;
+        self.sink.episode(&times, episode, &steps, filmed).map_err(|error| failed(&self.path, error))?;
         self.next_start_nanos = times.next_start_nanos;
         self.summary.episodes += 1;
         self.summary.failed += u64::from(!episode.outcome.is_success());
@@ -150,7 +163,7 @@ impl ShardWriter {
         if let Some(family) = self.family {
             metadata.insert("task_family".to_owned(), family.name().to_owned());
         }
-        self.sink.declare(metadata).map_err(|error| failed(&self.path, error))
+        self.sink.declare(metadata, &self.cameras).map_err(|error| failed(&self.path, error))
     }
 
     /// Whether an episode can be told, and when it happens.
@@ -189,32 +202,55 @@ struct Times {
 /// The library's writer with one channel a topic.
 struct Sink {
     mcap: Writer<AtomicFile>,
-    /// Next sequence number of each topic.
-    sequences: [u32; Topic::ALL.len()],
+    /// Next sequence number of each topic, then of those of each camera.
+    sequences: Vec<u32>,
     buffer: Vec<u8>,
 }
 
 impl Sink {
-    fn declare(&mut self, metadata: BTreeMap<String, String>) -> Result<(), McapError> {
+    fn declare(&mut self, metadata: BTreeMap<String, String>, cameras: &Cameras) -> Result<(), McapError> {
         self.mcap.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
         for topic in Topic::ALL {
             let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
             let id = channel_id(topic);
             self.mcap.add_channel_with_id(id, schema, topic.name(), "protobuf", &BTreeMap::new())?;
         }
+        for (number, camera) in cameras.configs().enumerate() {
+            let pictures = CameraTopic::pictures(camera.format);
+            for (kind, topic) in [CameraTopic::Calibration, CameraTopic::Transform, pictures].into_iter().enumerate() {
+                let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
+                let id = camera_channel(number, kind) as u16 + 1;
+                self.mcap.add_channel_with_id(id, schema, &topic.name(&camera.name), "protobuf", &BTreeMap::new())?;
+            }
+        }
         Ok(())
     }
 
-    fn episode(&mut self, times: &Times, episode: &Episode, steps: &[(u32, Step)]) -> Result<(), McapError> {
+    fn episode(
+        &mut self,
+        times: &Times,
+        episode: &Episode,
+        steps: &[(u32, Step)],
+        mut filmed: Vec<Filmed>,
+    ) -> Result<(), McapError> {
         let start_nanos = times.start_nanos;
         self.put(Topic::EpisodeStart, start_nanos, &start::encode(episode))?;
         self.put(Topic::Scene, start_nanos, &viewer::scene(start_nanos, episode))?;
         self.put(Topic::Log, start_nanos, &viewer::start_log(start_nanos, episode))?;
+        for (number, camera) in filmed.iter().enumerate() {
+            self.put_channel(camera_channel(number, 0), start_nanos, &camera.calibration(start_nanos))?;
+            self.put_channel(camera_channel(number, 1), start_nanos, &camera.transform(start_nanos))?;
+        }
         let mut steps = steps.iter().copied().peekable();
         let mut running = Vec::new();
         for (position, frame) in episode.frames.iter().enumerate() {
             let before = position.checked_sub(1).map(|before| &episode.frames[before]);
             self.frame(start_nanos, episode, position as u32, frame, before)?;
+            for (number, camera) in filmed.iter_mut().enumerate() {
+                let log_time_nanos = start_nanos + frame.time_nanos;
+                let picture = camera.picture(log_time_nanos, position);
+                self.put_channel(camera_channel(number, 2), log_time_nanos, &picture)?;
+            }
             let mut changed = false;
             while let Some((_, step)) = steps.next_if(|&(at, _)| at == position as u32) {
                 self.step(start_nanos, episode, step, &mut running)?;
@@ -280,10 +316,14 @@ impl Sink {
     }
 
     fn put_bytes(&mut self, topic: Topic, log_time_nanos: u64, message: &[u8]) -> Result<(), McapError> {
+        self.put_channel(topic as usize, log_time_nanos, message)
+    }
+
+    fn put_channel(&mut self, channel: usize, log_time_nanos: u64, message: &[u8]) -> Result<(), McapError> {
         check_size(op::MESSAGE, message)?;
-        let sequence = &mut self.sequences[topic as usize];
+        let sequence = &mut self.sequences[channel];
         let header = MessageHeader {
-            channel_id: channel_id(topic),
+            channel_id: channel as u16 + 1,
             sequence: *sequence,
             log_time: log_time_nanos,
             publish_time: log_time_nanos,
@@ -312,6 +352,14 @@ fn check_size(opcode: u8, content: &[u8]) -> Result<(), McapError> {
         0..=HALF_RECORD_BYTES => Ok(()),
         len => Err(McapError::RecordTooLarge { opcode, len: len as u64 }),
     }
+}
+
+/// Calibration, place and pictures.
+const TOPICS_PER_CAMERA: usize = 3;
+
+/// Position among all channels of a camera's calibration (0), place (1) or pictures (2).
+fn camera_channel(camera: usize, kind: usize) -> usize {
+    Topic::ALL.len() + TOPICS_PER_CAMERA * camera + kind
 }
 
 fn channel_id(topic: Topic) -> u16 {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules in reading order: each may use those before it and none after it. `rollout` and `trace` use the task's
 /// types; `task` names no later module.
-const ORDER: [&str; 24] = [
+const ORDER: &[&str] = &[
     "geometry",
     "seed",
     "scene",
@@ -16,6 +16,7 @@ const ORDER: [&str; 24] = [
     "task",
     "trace",
     "render",
+    "video",
     "robot",
     "sim",
     "expert",

@@ -12,11 +12,11 @@ mod dataset;
 mod dataset_edit;
 #[cfg(test)]
 mod expert;
+mod export;
 #[cfg(test)]
 mod fuzz;
 #[cfg(test)]
 mod kill;
-mod export;
 #[cfg(test)]
 mod kinematic;
 #[cfg(test)]
@@ -66,5 +66,6 @@ mod trace;
 mod training;
 #[cfg(test)]
 mod tutorial;
+mod video;
 #[cfg(test)]
 mod visualize;

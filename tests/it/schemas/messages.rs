@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::Record;
 use ntp::recording::ShardWriter;
+use ntp::render::{CameraConfig, PictureFormat, Viewpoint};
 use ntp::task::Split;
 use prost::Message;
 
@@ -53,7 +54,10 @@ fn schemas_of_a_recording() -> BTreeMap<String, (String, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shard.mcap");
     let task = tower("two", &[1, 3], Split::Seen);
-    let mut writer = ShardWriter::create(&path, "{}").unwrap();
+    let formats = [PictureFormat::Png, PictureFormat::H264].into_iter().zip([Viewpoint::Front, Viewpoint::Wrist]);
+    let cameras: Vec<CameraConfig> =
+        formats.map(|(format, view)| CameraConfig { format, ..CameraConfig::new(view, [16, 16]) }).collect();
+    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&cameras);
     writer.write(&demonstration(&task, &trial(&task, 0, 1), 0)).unwrap();
     writer.finish().unwrap();
     let bytes = fs::read(&path).unwrap();
@@ -95,7 +99,7 @@ fn every_schema_is_protobuf_and_declared_in_schemas() {
     let declared: BTreeSet<String> =
         proto_files().iter().flat_map(|path| declared(&fs::read_to_string(path).unwrap())).collect();
     let schemas = schemas_of_a_recording();
-    assert_eq!(schemas.len(), 10);
+    assert_eq!(schemas.len(), 13);
     for (name, (encoding, _)) in &schemas {
         assert_eq!(encoding, "protobuf");
         assert!(declared.contains(name), "{name} is in no file of schemas/mcap");

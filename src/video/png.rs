@@ -1,0 +1,46 @@
+//! PNG: fast to write, without loss.
+
+use image::codecs::png::{CompressionType, FilterType, PngDecoder, PngEncoder};
+use image::{ColorType, ExtendedColorType, ImageDecoder as _, ImageEncoder as _};
+
+use crate::video::VideoError;
+
+/// A picture: red, green, blue of each pixel, `[height, width, 3]`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rgb {
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// The widest and highest picture that is decoded.
+const MAX_SIDE_PX: u32 = 1 << 14;
+
+/// A picture as PNG, appended to `png`.
+///
+/// # Errors
+///
+/// When the bytes are not as many as the size says.
+pub fn encode_png(rgb: &[u8], [width, height]: [u32; 2], png: &mut Vec<u8>) -> Result<(), VideoError> {
+    let encoder = PngEncoder::new_with_quality(png, CompressionType::Fast, FilterType::Up);
+    let written = encoder.write_image(rgb, width, height, ExtendedColorType::Rgb8);
+    written.map_err(|error| VideoError::codec("encode", "PNG")(&error))
+}
+
+/// A picture from PNG.
+///
+/// # Errors
+///
+/// When it is no PNG of red, green and blue bytes.
+pub fn decode_png(png: &[u8]) -> Result<Rgb, VideoError> {
+    let failed = VideoError::codec("decode", "PNG");
+    let decoder = PngDecoder::new(std::io::Cursor::new(png)).map_err(|error| failed(&error))?;
+    let (width, height) = decoder.dimensions();
+    if decoder.color_type() != ColorType::Rgb8 || width.max(height) > MAX_SIDE_PX {
+        return Err(failed(&format!("{:?} of {width}x{height} pixels, expected Rgb8", decoder.color_type())));
+    }
+    let mut bytes = vec![0; width as usize * height as usize * 3];
+    decoder.read_image(&mut bytes).map_err(|error| failed(&error))?;
+    Ok(Rgb { size_px: [width, height], bytes })
+}

@@ -1,0 +1,142 @@
+//! Pictures come back from PNG, H.264 and MP4, and what is damaged is named.
+
+use ntp::render::{CameraConfig, PictureFormat, Viewpoint};
+use ntp::task::Split;
+use ntp::trace::Episode;
+use ntp::video::{
+    Film, H264Decoder, H264Encoder, Mp4Reader, Mp4Writer, Rgb, decode_png, encode_png, is_key_frame, write_gif,
+    write_mp4, write_png,
+};
+
+use crate::kinematic::{demonstration, tower, trial};
+
+const SIZE: [u32; 2] = [64, 48];
+
+fn episode() -> Episode {
+    let task = tower("three", &[1, 3, 5], Split::Seen);
+    demonstration(&task, &trial(&task, 0, 1), 0)
+}
+
+/// Pictures of an episode's frames.
+fn pictures() -> Vec<Rgb> {
+    let episode = episode();
+    let mut film = Film::new(&CameraConfig::new(Viewpoint::Front, SIZE));
+    film.begin_episode(&episode).unwrap();
+    let draw = |frame: &ntp::trace::Frame| {
+        let picture = film.draw(&episode.scene, &frame.state);
+        Rgb { size_px: [picture.width, picture.height], bytes: picture.rgb.clone() }
+    };
+    episode.frames.iter().map(draw).collect()
+}
+
+/// Packets with a key frame at every fourth picture.
+fn packets(pictures: &[Rgb]) -> Vec<Vec<u8>> {
+    let mut encoder = H264Encoder::new(SIZE, 10).unwrap();
+    let encode = |(position, picture): (usize, &Rgb)| {
+        let mut packet = Vec::new();
+        encoder.encode(&picture.bytes, position % 4 == 0, &mut packet).unwrap();
+        packet
+    };
+    pictures.iter().enumerate().map(encode).collect()
+}
+
+fn mean_difference(a: &Rgb, b: &Rgb) -> f64 {
+    assert_eq!(a.size_px, b.size_px);
+    let sum: f64 = a.bytes.iter().zip(&b.bytes).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    sum / a.bytes.len() as f64
+}
+
+#[test]
+fn png_gives_back_every_byte() {
+    for picture in pictures() {
+        let mut png = Vec::new();
+        encode_png(&picture.bytes, picture.size_px, &mut png).unwrap();
+        assert_eq!(decode_png(&png).unwrap(), picture);
+        assert!(decode_png(&png[..png.len() / 2]).is_err());
+    }
+    assert!(encode_png(&[0; 5], [1, 2], &mut Vec::new()).is_err());
+}
+
+#[test]
+fn h264_gives_back_nearly_what_went_in_picture_by_picture() {
+    let pictures = pictures();
+    let mut decoder = H264Decoder::new().unwrap();
+    let mut decoded = Rgb::default();
+    for (picture, packet) in pictures.iter().zip(packets(&pictures)) {
+        decoder.decode(&packet, &mut decoded).unwrap();
+        let difference = mean_difference(picture, &decoded);
+        assert!(difference < 4.0, "mean difference {difference}");
+    }
+}
+
+#[test]
+fn key_frames_stand_where_they_were_asked_for_and_alone() {
+    let pictures = pictures();
+    for (position, packet) in packets(&pictures).iter().enumerate() {
+        assert_eq!(is_key_frame(packet), position % 4 == 0, "picture {position}");
+        let mut decoded = Rgb::default();
+        let alone = H264Decoder::new().unwrap().decode(packet, &mut decoded);
+        assert_eq!(alone.is_ok(), position % 4 == 0, "picture {position}");
+    }
+}
+
+#[test]
+fn the_same_pictures_give_the_same_packets() {
+    let pictures = pictures();
+    assert_eq!(packets(&pictures), packets(&pictures));
+    assert!(H264Encoder::new(SIZE, 10).unwrap().encode(&[0; 7], true, &mut Vec::new()).is_err());
+}
+
+#[test]
+fn mp4_gives_back_every_packet_at_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clip.mp4");
+    let pictures = pictures();
+    let packets = packets(&pictures);
+    let mut writer = Mp4Writer::create(&path, SIZE, 10).unwrap();
+    packets.iter().for_each(|packet| writer.write(packet).unwrap());
+    writer.finish().unwrap();
+    let mut reader = Mp4Reader::open(&path).unwrap();
+    assert_eq!(reader.size_px(), SIZE);
+    assert_eq!(reader.samples().len(), packets.len());
+    let mut decoder = H264Decoder::new().unwrap();
+    let (mut packet, mut decoded) = (Vec::new(), Rgb::default());
+    for (position, picture) in pictures.iter().enumerate() {
+        let sample = reader.samples()[position];
+        assert!((sample.seconds - position as f64 / 10.0).abs() < 1e-9);
+        assert_eq!(sample.is_key, position % 4 == 0);
+        reader.read(position, &mut packet).unwrap();
+        decoder.decode(&packet, &mut decoded).unwrap();
+        assert!(mean_difference(picture, &decoded) < 4.0);
+    }
+    assert!(reader.read(packets.len(), &mut packet).is_err());
+}
+
+#[test]
+fn a_damaged_mp4_is_an_error_that_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clip.mp4");
+    write_mp4(&path, &episode(), &CameraConfig::new(Viewpoint::Wrist, SIZE), 5).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for len in [0, 7, 40, bytes.len() / 2, bytes.len() - 3] {
+        std::fs::write(&path, &bytes[..len]).unwrap();
+        let error = Mp4Reader::open(&path).err().map(|error| error.to_string());
+        assert!(error.is_some_and(|error| error.contains("clip.mp4")), "cut to {len}");
+    }
+}
+
+#[test]
+fn clips_are_written_in_each_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let episode = episode();
+    let end_secs = episode.frames.last().unwrap().time_nanos as f64 / 1e9;
+    let camera = CameraConfig { format: PictureFormat::H264, ..CameraConfig::new(Viewpoint::Front, SIZE) };
+    let [mp4, gif, png] = ["a.mp4", "a.gif", "a.png"].map(|name| folder.path().join(name));
+    let n_pictures = write_mp4(&mp4, &episode, &camera, 4).unwrap();
+    assert_eq!(n_pictures, (end_secs * 4.0).ceil() as u64 + 1);
+    assert_eq!(Mp4Reader::open(&mp4).unwrap().samples().len() as u64, n_pictures);
+    assert_eq!(write_gif(&gif, &episode, &camera, 4).unwrap(), n_pictures);
+    assert!(std::fs::read(&gif).unwrap().starts_with(b"GIF89a"));
+    write_png(&png, &episode, &camera, &episode.frames[0]).unwrap();
+    assert_eq!(decode_png(&std::fs::read(&png).unwrap()).unwrap().size_px, SIZE);
+}
