@@ -16,6 +16,8 @@ mod convert;
 mod costs;
 mod demonstration;
 mod error;
+mod eye;
+mod gallery;
 mod generate;
 mod layout;
 mod report;

@@ -17,7 +17,7 @@ mod rows;
 
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use expectation::Expectation;
-pub use interpreter::{Eye, Limits, RolloutEpisode, Start, run};
+pub use interpreter::{Eye, Limits, RolloutEpisode, Sight, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};

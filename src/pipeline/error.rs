@@ -12,6 +12,7 @@ use crate::table::TableError;
 use crate::task::{ImportError, SampleError, TaskFileError, TaskSetError};
 use crate::trace::TraceError;
 use crate::training::TrainError;
+use crate::video::VideoError;
 
 /// Why a pipeline could not be loaded or run.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +41,9 @@ pub enum PipelineError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Io(#[from] IoError),
+    #[expect(missing_docs, reason = "wraps an error that documents itself")]
+    #[error(transparent)]
+    Video(#[from] VideoError),
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Contract(#[from] ContractError),

@@ -8,6 +8,7 @@ use crate::artifact;
 use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::render::PictureFormat;
 use crate::task::{Family, Split, split_limits};
 
 /// A checked pipeline.
@@ -159,9 +160,26 @@ impl Pipeline {
             if let Err(problem) = model.training(model.seeds[0]).check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
+            if let Some(problem) = model.variant.sees().then(|| self.blindness()).flatten() {
+                return Err(self.value(&format!("models[{idx}].variant"), format!("is {}; {problem}", model.variant)));
+            }
             self.check_acting(idx, model)?;
         }
         Ok(())
+    }
+
+    /// What keeps a variant that sees from seeing.
+    fn blindness(&self) -> Option<&'static str> {
+        match self.spec.generate.cameras.first() {
+            None => Some("it sees with the first of generate.cameras, and there is none"),
+            Some(camera) if camera.format != PictureFormat::Png => {
+                Some("the first of generate.cameras must have format png")
+            }
+            Some(camera) if camera.size_px[0] != camera.size_px[1] => {
+                Some("the first of generate.cameras must be as wide as high")
+            }
+            Some(_) => None,
+        }
     }
 
     /// How a model acts, and what.

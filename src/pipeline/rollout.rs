@@ -9,6 +9,7 @@ use serde_json::json;
 use crate::artifact::{FileEntry, Plan, Receipt};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
 use crate::pipeline::demonstration::{self, Demonstrations};
+use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
@@ -16,7 +17,10 @@ use crate::pipeline::trials::trial;
 use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
-use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Start, load_policy};
+use crate::robot::RobotApi as _;
+use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy};
+use crate::seed::Seed;
+use crate::sim::Simulation;
 use crate::task::{Split, Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
@@ -242,7 +246,15 @@ impl Suite<'_> {
         let config = simulation_config(recorded, &context.pipeline.spec.generate.simulation);
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
         let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
-        Ok(Start { task, demonstration, world: Box::new(world), eye: None, provenance })
+        let sight = self.sight(&demonstration, &world, own.seed)?;
+        Ok(Start { task, demonstration, world: Box::new(world), sight, provenance })
+    }
+
+    /// What a model that sees is given: the first camera's pictures, as in the dataset that it learned from.
+    fn sight(&self, demonstration: &Episode, world: &Simulation, seed: Seed) -> Result<Option<Sight>, PipelineError> {
+        let sees = self.learned.as_ref().is_some_and(|learned| learned.variant.sees());
+        let camera = self.context.pipeline.spec.generate.cameras.first().filter(|_| sees);
+        camera.map(|camera| sight(camera, demonstration, world.scene(), seed)).transpose()
     }
 
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {

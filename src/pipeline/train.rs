@@ -9,9 +9,9 @@ use crate::dataset::{self, DatasetTrials};
 use crate::model::{CONFIG_FILE, WEIGHTS_FILE};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
-use crate::pipeline::{ModelSpec, PipelineError, Stage, tasks};
+use crate::pipeline::{ModelSpec, PipelineError, Stage, gallery, tasks};
 use crate::task::Split;
-use crate::training::{self, Hooks, METRICS_FILE};
+use crate::training::{self, Gallery, Hooks, METRICS_FILE};
 
 /// What a finished training leaves; checkpoints are not part of it.
 const RESULT_FILES: [&str; 3] = [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE];
@@ -55,7 +55,9 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         progress.message(&format!("loss {:.3}", now.loss));
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
-    let summary = training::train(&training, &trials, unit.dir.path(), &mut hooks);
+    let gallery = spec.variant.sees().then(|| gallery::read(context, &trials)).transpose()?;
+    let gallery = gallery.as_ref().map(|gallery| gallery as &dyn Gallery);
+    let summary = training::train_seeing(&training, &trials, gallery, unit.dir.path(), &mut hooks);
     context.go_on()?;
     let summary = summary?;
     let files: Result<Vec<FileEntry>, IoError> =

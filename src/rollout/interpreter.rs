@@ -27,19 +27,24 @@ pub struct Start<'t> {
     pub demonstration: Episode,
     /// The world to act in.
     pub world: Box<dyn RobotApi + Send>,
-    /// What a policy that sees looks with; `None` for one that is given positions.
-    pub eye: Option<Box<dyn Eye>>,
+    /// For a policy that sees; `None` for one that is given positions.
+    pub sight: Option<Sight>,
     /// Where the new episode comes from.
     pub provenance: Provenance,
 }
 
-/// A camera before the world, and before the demonstration.
+/// A camera before the world.
 pub trait Eye: Send {
-    /// Adds a picture of a frame.
-    fn look(&mut self, scene: &Scene, frame: &Frame, into: &mut Pictures);
+    /// What it sees of a frame: one picture.
+    fn look(&mut self, scene: &Scene, frame: &Frame) -> Pictures;
+}
 
-    /// No pictures yet, of its size.
-    fn nothing(&self) -> Pictures;
+/// What a policy that sees is given in place of positions.
+pub struct Sight {
+    /// Pictures of the demonstration's boundary frames.
+    pub video: Pictures,
+    /// What it looks at the world with.
+    pub eye: Box<dyn Eye>,
 }
 
 /// When a rollout is given up.
@@ -122,12 +127,13 @@ struct Running<'t> {
 
 impl<'t> Running<'t> {
     fn new(start: Start<'t>, decisions: Decisions, reads: SpecificationForm, limits: Limits) -> Self {
-        let Start { task, demonstration, world, mut eye, provenance } = start;
+        let Start { task, demonstration, world, sight, provenance } = start;
         let demonstration = demonstration.boundaries_only();
         let expectation =
             Expectation::new(decisions, &demonstration, world.scene()).specified_in(reads, &demonstration);
-        let specification = match &mut eye {
-            Some(eye) if reads == SpecificationForm::Video => video(eye.as_mut(), &demonstration),
+        let (video, mut eye) = sight.map(|sight| (sight.video, sight.eye)).unzip();
+        let specification = match video {
+            Some(video) if reads == SpecificationForm::Video => Specification::video(&demonstration, video),
             _ => Specification::in_form(reads, &demonstration),
         };
         let specification = Arc::new(specification);
@@ -242,15 +248,5 @@ impl<'t> Running<'t> {
 
 /// What an eye sees of the world now; nothing without an eye.
 fn seen(eye: &mut Option<Box<dyn Eye>>, world: &dyn RobotApi) -> Pictures {
-    let Some(eye) = eye else { return Pictures::default() };
-    let mut picture = eye.nothing();
-    eye.look(world.scene(), world.now(), &mut picture);
-    picture
-}
-
-/// What an eye sees of a demonstration's boundary frames.
-fn video(eye: &mut dyn Eye, demonstration: &Episode) -> Specification {
-    let mut pictures = eye.nothing();
-    demonstration.boundary_frames().for_each(|(_, frame)| eye.look(&demonstration.scene, frame, &mut pictures));
-    Specification::video(demonstration, pictures)
+    eye.as_mut().map_or_else(Pictures::default, |eye| eye.look(world.scene(), world.now()))
 }

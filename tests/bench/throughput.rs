@@ -233,7 +233,7 @@ fn first_query(demonstration: &Episode) -> ntp::rollout::Query {
 fn start(task: &Task, demonstration: Episode) -> Start<'_> {
     let own = trial(task, 91, 1);
     let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), 0);
-    Start { task, demonstration, world: Box::new(world(task, &own, 0)), eye: None, provenance }
+    Start { task, demonstration, world: Box::new(world(task, &own, 0)), sight: None, provenance }
 }
 
 fn convert_all(recordings: &Path, out: &Path) -> u64 {

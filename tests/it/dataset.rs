@@ -484,7 +484,7 @@ fn rollouts() -> Vec<Episode> {
         task: &task,
         demonstration: densify(&demonstration(&task, &trial(&task, 0, 1), 0), 4),
         world: Box::new(KinematicWorld::new(task.family, &own_trial)),
-        eye: None,
+        sight: None,
         provenance: Provenance::new(&task, &own_trial, Actor::Policy(String::new()), 0),
     };
     let starts = vec![start];

@@ -12,6 +12,7 @@ mod dataset;
 mod dataset_edit;
 #[cfg(test)]
 mod expert;
+#[cfg(test)]
 mod export;
 #[cfg(test)]
 mod fuzz;
@@ -41,6 +42,7 @@ mod query;
 mod recording;
 #[cfg(test)]
 mod render;
+#[cfg(test)]
 mod repair;
 #[cfg(test)]
 mod report;
@@ -66,6 +68,7 @@ mod trace;
 mod training;
 #[cfg(test)]
 mod tutorial;
+#[cfg(test)]
 mod video;
 #[cfg(test)]
 mod visualize;

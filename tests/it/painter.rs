@@ -2,7 +2,7 @@
 
 use ntp::geometry::Vec3;
 use ntp::model::Pictures;
-use ntp::rollout::Eye;
+use ntp::rollout::{Eye, Sight};
 use ntp::scene::Scene;
 use ntp::trace::{Episode, Frame};
 use ntp::training::Gallery;
@@ -68,12 +68,24 @@ fn fill(rgb: &mut [u8], centre: [f32; 2], half: [f32; 2], colour: [u8; 3]) {
 }
 
 impl Eye for Painter {
-    fn look(&mut self, scene: &Scene, frame: &Frame, into: &mut Pictures) {
-        into.push(&self.paint(scene, frame));
+    fn look(&mut self, scene: &Scene, frame: &Frame) -> Pictures {
+        let mut picture = Self::nothing();
+        picture.push(&self.paint(scene, frame));
+        picture
+    }
+}
+
+impl Painter {
+    /// No picture yet.
+    pub(crate) fn nothing() -> Pictures {
+        Pictures::of_size(PIXELS, PIXELS)
     }
 
-    fn nothing(&self) -> Pictures {
-        Pictures::of_size(PIXELS, PIXELS)
+    /// What a policy is given of a demonstration.
+    pub(crate) fn sight(demonstration: &Episode) -> Sight {
+        let mut video = Self::nothing();
+        demonstration.boundary_frames().for_each(|(_, frame)| video.push(&Self.paint(&demonstration.scene, frame)));
+        Sight { video, eye: Box::new(Self) }
     }
 }
 

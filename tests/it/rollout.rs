@@ -15,7 +15,7 @@ fn start(task: &Task, demonstrated: u16, on_table: u16) -> Start<'_> {
         task,
         demonstration: demonstration(task, &trial(task, 0, demonstrated), 0),
         world: Box::new(KinematicWorld::new(task.family, &own_trial)),
-        eye: None,
+        sight: None,
         provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 0),
     }
 }

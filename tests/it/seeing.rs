@@ -9,7 +9,7 @@ use ntp::model::{
     ColourSlots, ColourSlotsConfig, Convolved, ConvolvedConfig, Decoder, FlatEncoder, Flattened, FlattenedConfig,
     Network as _, Ntp, Perception as _, PictureSample, Variant, WEIGHTS_FILE,
 };
-use ntp::rollout::{Eye as _, Limits, Start, load_policy, run};
+use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, Provenance, SpecificationForm};
@@ -47,7 +47,7 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 fn colour_slots_find_each_block_and_the_robot_first() {
     let task = tower("a", &[0, 1, 2, 3], Split::Seen);
     let (_, paintings) = shown(&[task], 12);
-    let mut sample = PictureSample { pictures: Painter.nothing(), lengths: Vec::new() };
+    let mut sample = PictureSample { pictures: Painter::nothing(), lengths: Vec::new() };
     for (idx, episode) in paintings.0.iter().enumerate() {
         let n_frames = episode.boundary_frames().count();
         paintings.fetch(idx, &(0..n_frames).collect::<Vec<_>>(), &mut sample.pictures).unwrap();
@@ -56,7 +56,7 @@ fn colour_slots_find_each_block_and_the_robot_first() {
     let config = ColourSlotsConfig { pixels: 64, colours: 9 };
     let mut slots = ColourSlots::fresh(&config, Seed(1), &Device::flex());
     slots = slots.acquainted(&sample, Seed(2));
-    let mut first = Painter.nothing();
+    let mut first = Painter::nothing();
     paintings.fetch(0, &[0], &mut first).unwrap();
     let found = values(slots.look(&first));
     let episode = &paintings.0[0];
@@ -77,7 +77,7 @@ fn the_paper_s_picture_network_has_seven_layers_and_a_vector_of_128() {
     let flattened = Ntp::<Flattened>::new(&FlattenedConfig::default(), 8, Seed(1), &Device::flex()).num_params();
     // Three layers read 128 features where those of positions read 50.
     assert_eq!(network.num_params(), flattened + pictures + 3 * (128 - 50) * 96);
-    let mut painted = Painter.nothing();
+    let mut painted = Painter::nothing();
     let (_, paintings) = shown(&[tower("a", &[0, 1], Split::Seen)], 1);
     paintings.fetch(0, &[0, 1, 0], &mut painted).unwrap();
     let features = values(network.perceive(&painted));
@@ -124,11 +124,12 @@ fn success_rate(folder: &Path, tasks: &[Task]) -> f32 {
     let (_, mut policy) = load_policy(folder, Decoder::Mss).unwrap();
     let start = |task| {
         let own = trial(task, 100, 1);
+        let demonstration = demonstration(task, &trial(task, 101, 1), 0);
         Start {
             task,
-            demonstration: demonstration(task, &trial(task, 101, 1), 0),
+            sight: Some(Painter::sight(&demonstration)),
+            demonstration,
             world: Box::new(KinematicWorld::new(task.family, &own)),
-            eye: Some(Box::new(Painter)),
             provenance: Provenance::new(task, &own, Actor::Policy(String::new()), 0),
         }
     };

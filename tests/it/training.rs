@@ -373,7 +373,7 @@ fn success_rate(folder: &Path, decoder: Decoder, tasks: &[Task]) -> f32 {
             task,
             demonstration: demonstration(task, &trial(task, 101, 1), 0),
             world: Box::new(KinematicWorld::new(task.family, &own)),
-            eye: None,
+            sight: None,
             provenance: Provenance::new(task, &own, Actor::Policy(String::new()), 0),
         }
     };

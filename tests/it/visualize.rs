@@ -55,7 +55,7 @@ fn rollout(task: &Task) -> (Episode, Episode) {
         task,
         demonstration: shown.clone(),
         world: Box::new(KinematicWorld::new(task.family, &own_trial)),
-        eye: None,
+        sight: None,
         provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 42),
     };
     let expected = Expectation::new(Decisions::Scoped, &start.demonstration, start.world.scene());
