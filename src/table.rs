@@ -26,6 +26,7 @@ mod values;
 mod write;
 
 pub(crate) use batches::{BatchReader, BatchWriter};
+pub(crate) use column::FloatRows;
 pub use column::{Column, Columns};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;

@@ -3,11 +3,11 @@
 use crate::dataset::DatasetError;
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
-use crate::table::{Columns, TableError};
+use crate::table::{Columns, FloatRows, TableError};
 
 /// The columns of `data/` that a learner of programs needs.
 pub(crate) struct FrameBatch {
-    pub(crate) state: Vec<Vec<f32>>,
+    pub(crate) state: FloatRows,
     pub(crate) frame_index: Vec<i64>,
     pub(crate) episode_index: Vec<i64>,
     pub(crate) index: Vec<i64>,
@@ -20,7 +20,7 @@ impl Batch for FrameBatch {
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
-            state: columns.float32_list("observation.state")?,
+            state: columns.float_rows("observation.state")?,
             frame_index: columns.int64("frame_index")?,
             episode_index: columns.int64("episode_index")?,
             index: columns.int64("index")?,
@@ -36,11 +36,11 @@ impl FrameBatch {
             ("index", self.index[at], row.first_index + frame),
             ("episode_index", self.episode_index[at], row.episode_index),
             ("frame_index", self.frame_index[at], frame),
-            ("the length of observation.state", self.state[at].len() as i64, width as i64),
+            ("the length of observation.state", self.state.row(at).len() as i64, width as i64),
         ];
         let wrong = numbers.into_iter().find(|(_, found, expected)| found != expected);
         let wrong = wrong.map(|(name, found, expected)| format!("{name} is {found}, but should be {expected}"));
-        let finite = self.state[at].iter().all(|value| value.is_finite());
+        let finite = self.state.row(at).iter().all(|value| value.is_finite());
         wrong.or_else(|| (!finite).then(|| "observation.state is not finite".to_owned()))
     }
 }
@@ -66,7 +66,7 @@ pub(crate) fn read_frames(
         }
         frames.is_boundary.push(batch.boundary[at]);
         if batch.boundary[at] {
-            frames.observations.extend_from_slice(&batch.state[at]);
+            frames.observations.extend_from_slice(batch.state.row(at));
         }
     }
     Ok(frames)

@@ -69,8 +69,11 @@ pub(super) fn tables(root: &Path, summary: &DatasetSummary) -> Result<Vec<TableF
 }
 
 fn facts(table: &str, name: String, column: Option<ColumnKind>) -> ColumnFacts {
-    let kind = column.map_or_else(|| "group".to_owned(), |kind| kind.to_string());
-    ColumnFacts { meaning: meaning(table, &name).unwrap_or("not described"), name, kind, column }
+    let is_picture = column.is_none() && name.starts_with("observation.images.");
+    let (other, unknown) =
+        if is_picture { ("picture", "what a camera saw, encoded") } else { ("group", "not described") };
+    let kind = column.map_or_else(|| other.to_owned(), |kind| kind.to_string());
+    ColumnFacts { meaning: meaning(table, &name).unwrap_or(unknown), name, kind, column }
 }
 
 /// What a column means, from the table of its section: `| column | type | meaning |`.

@@ -89,12 +89,47 @@ impl Column {
     }
 }
 
+/// Lists of floats one after another: without an allocation a row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct FloatRows {
+    values: Vec<f32>,
+    /// Of each row, one past its last value.
+    ends: Vec<usize>,
+}
+
+impl FloatRows {
+    /// From all values and the borders between rows, which begin with that of the first row.
+    pub(crate) fn new(values: &[f32], borders: &[i32]) -> Self {
+        let first = borders.first().map_or(0, |&border| border as usize);
+        let ends: Vec<usize> = borders.iter().skip(1).map(|&border| border as usize - first).collect();
+        let n_values = ends.last().copied().unwrap_or(0);
+        Self { values: values[first..first + n_values].to_vec(), ends }
+    }
+
+    /// How many rows.
+    pub(crate) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The values of a row.
+    pub(crate) fn row(&self, at: usize) -> &[f32] {
+        let begin = if at == 0 { 0 } else { self.ends[at - 1] };
+        &self.values[begin..self.ends[at]]
+    }
+
+    fn to_lists(&self) -> Vec<Vec<f32>> {
+        (0..self.len()).map(|at| self.row(at).to_vec()).collect()
+    }
+}
+
 /// Columns by name, all of one length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
     path: PathBuf,
     schema: &'static str,
     columns: Vec<(String, Column)>,
+    /// Lists of floats, where they were read in batches.
+    float_rows: Vec<(String, FloatRows)>,
 }
 
 macro_rules! takers {
@@ -136,12 +171,29 @@ takers! {
 
 impl Columns {
     pub(crate) fn new(path: &Path, schema: &'static str, columns: Vec<(String, Column)>) -> Self {
-        Self { path: path.to_owned(), schema, columns }
+        Self { path: path.to_owned(), schema, columns, float_rows: Vec::new() }
+    }
+
+    pub(crate) fn with_float_rows(self, float_rows: Vec<(String, FloatRows)>) -> Self {
+        Self { float_rows, ..self }
+    }
+
+    /// Takes lists of floats out as they were read.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such column.
+    pub(crate) fn float_rows(&mut self, name: &str) -> Result<FloatRows, TableError> {
+        match self.float_rows.iter().position(|(column, _)| column == name) {
+            Some(position) => Ok(self.float_rows.remove(position).1),
+            None => Err(self.missing(name, Column::Float32List(Vec::new()).kind())),
+        }
     }
 
     /// How many rows.
     pub fn n_rows(&self) -> usize {
-        self.columns.first().map_or(0, |(_, column)| column.len())
+        let of_rows = || self.float_rows.first().map_or(0, |(_, rows)| rows.len());
+        self.columns.first().map_or_else(of_rows, |(_, column)| column.len())
     }
 
     /// A column by name.
@@ -155,14 +207,21 @@ impl Columns {
     }
 
     fn take(&mut self, name: &str, expected: ColumnKind) -> Result<Column, TableError> {
-        match self.columns.iter().position(|(column, _)| column == name) {
-            Some(position) => Ok(self.columns.remove(position).1),
-            None => Err(TableError::MissingColumn {
-                path: self.path.clone(),
-                schema: self.schema,
-                column: name.to_owned(),
-                expected: expected.to_string(),
-            }),
+        if let Some(position) = self.columns.iter().position(|(column, _)| column == name) {
+            return Ok(self.columns.remove(position).1);
+        }
+        match self.float_rows.iter().position(|(column, _)| column == name) {
+            Some(position) => Ok(Column::Float32List(self.float_rows.remove(position).1.to_lists())),
+            None => Err(self.missing(name, expected)),
+        }
+    }
+
+    fn missing(&self, name: &str, expected: ColumnKind) -> TableError {
+        TableError::MissingColumn {
+            path: self.path.clone(),
+            schema: self.schema,
+            column: name.to_owned(),
+            expected: expected.to_string(),
         }
     }
 

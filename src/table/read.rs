@@ -14,8 +14,10 @@ use parquet::file::metadata::ParquetMetaData;
 
 use crate::artifact::IoError;
 use crate::table::guard::guarded;
-use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
+use crate::table::{Column, ColumnKind, Columns, FloatRows, Form, TableError, TableSchema, Value};
 
+/// What is read without an allocation a row.
+const FLOAT_LIST: ColumnKind = ColumnKind { value: Value::Float32, form: Form::List };
 /// Rows of one batch.
 const BATCH_ROWS: usize = 8192;
 
@@ -112,24 +114,64 @@ impl TableReader {
     }
 
     fn append(&self, name: &str, column: &mut Column, batch: &RecordBatch, first_row: u64) -> Result<(), TableError> {
-        let expected = column.kind();
-        let wrong = |found: String| TableError::ColumnKind {
-            path: self.path.clone(),
-            schema: self.schema,
-            column: name.to_owned(),
-            expected: expected.to_string(),
-            found,
+        let array = self.array(name, column.kind(), batch, first_row)?;
+        append_array(column, array).ok_or_else(|| self.wrong(name, column.kind(), array.data_type().to_string()))
+    }
+
+    /// Lists of floats of a batch, as they lie in it.
+    fn float_rows(&self, name: &str, batch: &RecordBatch, first_row: u64) -> Result<FloatRows, TableError> {
+        let array = self.array(name, FLOAT_LIST, batch, first_row)?;
+        let rows = || {
+            let list = array.as_list_opt::<i32>()?;
+            Some(FloatRows::new(list.values().as_primitive_opt::<Float32Type>()?.values(), list.offsets()))
         };
-        let array = batch.column_by_name(name).ok_or_else(|| wrong("missing".to_owned()))?;
-        if let Some(row) = first_null(array, expected) {
-            return Err(TableError::Null {
+        rows().ok_or_else(|| self.wrong(name, FLOAT_LIST, array.data_type().to_string()))
+    }
+
+    /// A column of a batch, without nulls where there must be none.
+    fn array<'b>(
+        &self,
+        name: &str,
+        expected: ColumnKind,
+        batch: &'b RecordBatch,
+        first_row: u64,
+    ) -> Result<&'b ArrayRef, TableError> {
+        let array = batch.column_by_name(name).ok_or_else(|| self.wrong(name, expected, "missing".to_owned()))?;
+        match first_null(array, expected) {
+            None => Ok(array),
+            Some(row) => Err(TableError::Null {
                 path: self.path.clone(),
                 schema: self.schema,
                 column: name.to_owned(),
                 row: first_row + row as u64,
-            });
+            }),
         }
-        append_array(column, array).ok_or_else(|| wrong(array.data_type().to_string()))
+    }
+
+    fn wrong(&self, column: &str, expected: ColumnKind, found: String) -> TableError {
+        TableError::ColumnKind {
+            path: self.path.clone(),
+            schema: self.schema,
+            column: column.to_owned(),
+            expected: expected.to_string(),
+            found,
+        }
+    }
+
+    /// The next batch as columns.
+    fn next_columns(&mut self) -> Result<Option<Columns>, TableError> {
+        let first_row = self.rows_read;
+        let Some(batch) = self.next_batch()? else { return Ok(None) };
+        let (mut columns, mut float_rows) = (Vec::new(), Vec::new());
+        for (name, kind) in &self.columns {
+            if *kind == FLOAT_LIST {
+                float_rows.push((name.clone(), self.float_rows(name, &batch, first_row)?));
+            } else if let Some(mut column) = Column::empty(*kind) {
+                self.append(name, &mut column, &batch, first_row)?;
+                columns.push((name.clone(), column));
+            }
+        }
+        Ok(Some(Columns::new(&self.path, self.schema, columns).with_float_rows(float_rows)))
     }
 }
 
@@ -137,12 +179,7 @@ impl Iterator for TableReader {
     type Item = Result<Columns, TableError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let mut columns = self.empty_columns();
-        match self.append_batch(&mut columns) {
-            Ok(true) => Some(Ok(Columns::new(&self.path, self.schema, columns))),
-            Ok(false) => None,
-            Err(error) => Some(Err(error)),
-        }
+        self.next_columns().transpose()
     }
 }
 

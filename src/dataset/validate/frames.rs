@@ -10,13 +10,13 @@ use crate::dataset::finding::Validation;
 use crate::dataset::frame_rows::FrameBatch;
 use crate::dataset::layout;
 use crate::dataset::validate::meta::Texts;
-use crate::table::{Columns, TableError};
+use crate::table::{Columns, FloatRows, TableError};
 use crate::trace::{Observation, ProgramCall};
 
 /// Every column of `data/`.
 pub(super) struct FullFrameBatch {
     base: FrameBatch,
-    action: Vec<Vec<f32>>,
+    action: FloatRows,
     timestamp: Vec<f32>,
     task_index: Vec<i64>,
     subtask_index: Vec<i64>,
@@ -24,7 +24,7 @@ pub(super) struct FullFrameBatch {
     success: Vec<bool>,
     time_secs: Vec<f64>,
     recording_frame: Vec<i64>,
-    gripper: Vec<Vec<f32>>,
+    gripper: FloatRows,
     call_id: Vec<i64>,
     program: Vec<String>,
 }
@@ -52,7 +52,7 @@ impl Batch for FullFrameBatch {
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
             base: FrameBatch::take(columns)?,
-            action: columns.float32_list("action")?,
+            action: columns.float_rows("action")?,
             timestamp: columns.float32("timestamp")?,
             task_index: columns.int64("task_index")?,
             subtask_index: columns.int64("subtask_index")?,
@@ -60,7 +60,7 @@ impl Batch for FullFrameBatch {
             success: columns.boolean("next.success")?,
             time_secs: columns.float64("ntp.time_secs")?,
             recording_frame: columns.int64("ntp.recording_frame")?,
-            gripper: columns.float32_list("ntp.gripper_in_world_m")?,
+            gripper: columns.float_rows("ntp.gripper_in_world_m")?,
             call_id: columns.int64("ntp.call_id")?,
             program: columns.text("ntp.program")?,
         })
@@ -105,13 +105,13 @@ impl FrameCheck {
                 return Err(cursor.problem(problem));
             }
             validation.frames += 1;
-            self.widen(&batch.base.state[at]);
+            self.widen(batch.base.state.row(at));
             let mut problems = self.row_problems(batch, at, row, frame, texts);
             problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
             problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
             before = Some(Before {
-                action: first(&batch.action[at]),
-                gripper: first(&batch.gripper[at]),
+                action: first(batch.action.row(at)),
+                gripper: first(batch.gripper.row(at)),
                 time_secs: batch.time_secs[at],
                 recording_frame: batch.recording_frame[at],
             });
@@ -155,15 +155,15 @@ impl FrameCheck {
         problems
             .extend(texts.task_problem(batch.task_index[at], &row.task_text).map(|problem| ("frames.task", problem)));
         problems.extend(texts.subtask_problem(batch.subtask_index[at]).map(|problem| ("frames.task", problem)));
-        let one_hot = &batch.base.state[at][self.width - 2..];
+        let one_hot = &batch.base.state.row(at)[self.width - 2..];
         if !matches!(one_hot, [1.0, 0.0] | [0.0, 1.0]) {
             problems.push(("frames.state", format!("(open, closed) are {one_hot:?}")));
         }
-        if batch.action[at].len() != ACTION_NAMES.len() || batch.gripper[at].len() != 3 {
-            let lengths = (batch.action[at].len(), batch.gripper[at].len());
+        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.gripper.row(at).len() != 3 {
+            let lengths = (batch.action.row(at).len(), batch.gripper.row(at).len());
             problems.push(("frames.action", format!("action and gripper position are {lengths:?} wide, not (4, 3)")));
-        } else if is_last && batch.action[at] != [0.0, 0.0, 0.0, one_hot[1]] {
-            problems.push(("frames.action", format!("the last action is {:?}", batch.action[at])));
+        } else if is_last && batch.action.row(at) != [0.0, 0.0, 0.0, one_hot[1]] {
+            problems.push(("frames.action", format!("the last action is {:?}", batch.action.row(at))));
         }
         problems
     }
@@ -193,9 +193,9 @@ fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&
             format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
         ));
     }
-    let [x, y, z] = first(&batch.gripper[at]);
+    let [x, y, z] = first(batch.gripper.row(at));
     let [from_x, from_y, from_z] = before.gripper;
-    let closed = batch.base.state[at].last().copied().unwrap_or(f32::NAN);
+    let closed = batch.base.state.row(at).last().copied().unwrap_or(f32::NAN);
     let expected = [x - from_x, y - from_y, z - from_z, closed];
     (before.action != expected).then(|| {
         ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
