@@ -31,6 +31,7 @@ pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
 pub use read::{TableReader, read};
+pub(crate) use read::{read_further, read_pictures};
 pub use schema::TableSchema;
 pub(crate) use values::Values;
 pub use write::write;
