@@ -10,6 +10,7 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! camera/{front, wrist}             what cameras see
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
 //! specification/…                   which part of the specification each running program may see
@@ -31,6 +32,7 @@ mod clock;
 mod gripper;
 mod lanes;
 mod palette;
+mod pictures;
 mod rrd;
 mod series;
 mod specification;
@@ -45,6 +47,7 @@ use rerun::log::ChunkError;
 
 use crate::artifact::IoError;
 use crate::trace::{Actor, Episode};
+use crate::video::VideoError;
 use crate::visualize::rrd::RrdFile;
 use crate::visualize::store::Store;
 
@@ -117,6 +120,9 @@ pub enum VisualizeError {
         /// What Rerun said.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A picture cannot be drawn.
+    #[error(transparent)]
+    Picture(#[from] VideoError),
     /// The file cannot be written.
     #[error(transparent)]
     Io(#[from] IoError),
@@ -218,6 +224,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     text::put_document(&mut store, episode)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
+    pictures::put(&mut store, episode)?;
     calls::put(&mut store, episode)?;
     lanes::put(&mut store, "programs", episode)?;
     if let Some(demonstration) = demonstration {
