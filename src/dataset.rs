@@ -5,6 +5,7 @@
 //! [`convert`] reads episodes of recordings (demonstrations or rollouts) and writes a directory:
 //!
 //! ```text
+//! videos/FEATURE/chunk-000/file-000.mp4      what cameras saw, if it was recorded as a video
 //! meta/info.json, stats.json, tasks.parquet, subtasks.parquet, episodes/chunk-000/file-000.parquet
 //! data/chunk-000/file-000.parquet            one row per frame
 //! ntp/info.json, episodes.parquet            provenance, one row per episode
@@ -40,6 +41,7 @@ mod frames;
 mod info;
 mod layout;
 mod lookup;
+mod pictures;
 mod read;
 mod rolling;
 pub mod schema;
@@ -58,6 +60,7 @@ pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use lookup::{CallFacts, EpisodeFacts, FrameFacts, look_up};
+pub use pictures::EpisodePictures;
 pub use read::read_trials;
 pub use summary::{DatasetSummary, summarize};
 pub use table_files::table_files;

@@ -32,6 +32,7 @@ pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
 pub use read::{TableReader, file_columns, read};
+pub(crate) use read::{read_further, read_pictures};
 pub use schema::TableSchema;
 pub(crate) use values::Values;
 pub use write::write;

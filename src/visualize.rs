@@ -10,6 +10,7 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! camera/{front, wrist}             what cameras see
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
 //! agreement                         whether a rollout's decisions are the expert's, until the first that is not
@@ -33,6 +34,7 @@ mod clock;
 mod gripper;
 mod lanes;
 mod palette;
+mod pictures;
 mod rrd;
 mod series;
 mod specification;
@@ -48,6 +50,7 @@ use rerun::log::ChunkError;
 use crate::artifact::IoError;
 use crate::rollout::Divergence;
 use crate::trace::{Actor, Episode};
+use crate::video::VideoError;
 use crate::visualize::rrd::RrdFile;
 use crate::visualize::store::Store;
 
@@ -122,6 +125,9 @@ pub enum VisualizeError {
         /// What Rerun said.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A picture cannot be drawn.
+    #[error(transparent)]
+    Picture(#[from] VideoError),
     /// The file cannot be written.
     #[error(transparent)]
     Io(#[from] IoError),
@@ -223,6 +229,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
+    pictures::put(&mut store, episode)?;
     calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;
     if let Some(demonstration) = demonstration {

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
 use crate::dataset::writer::{ConvertSummary, DatasetWriter};
+use crate::recording::Pictured;
 use crate::trace::{Boundaries, Episode};
 
 /// One recording: its name and hash, and its episodes in order.
@@ -37,6 +38,18 @@ impl RecordedEpisode for Episode {
 impl RecordedEpisode for Boundaries {
     fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError> {
         writer.append_boundaries(self, file, sha256)
+    }
+}
+
+impl RecordedEpisode for Pictured<Episode> {
+    fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        writer.append_pictured(self, file, sha256)
+    }
+}
+
+impl RecordedEpisode for Pictured<Boundaries> {
+    fn append_to(&self, writer: &mut DatasetWriter, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        writer.append_pictured_boundaries(self, file, sha256)
     }
 }
 

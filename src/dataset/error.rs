@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::artifact::IoError;
 use crate::table::TableError;
+use crate::video::VideoError;
 
 /// A dataset that could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +40,19 @@ pub enum ConvertError {
         /// Slots of the episode.
         found: usize,
     },
+    /// Pictures of a camera cannot be taken over.
+    #[error("episode {episode}, camera {camera}: {problem}")]
+    Pictures {
+        /// The episode's number in its recordings.
+        episode: u64,
+        /// The camera's name.
+        camera: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A video could not be written.
+    #[error(transparent)]
+    Video(#[from] VideoError),
     /// Rows are to be made of frames that were not read.
     #[error("episode {episode}: all frames are to be rows, but only its boundary frames were read")]
     FramesMissing {

@@ -16,6 +16,10 @@ pub(crate) enum Dtype {
     Int64,
     Bool,
     String,
+    /// Encoded pictures in a column.
+    Image,
+    /// Pictures in video files beside the tables.
+    Video,
 }
 
 /// How many values a row has.
@@ -88,6 +92,6 @@ impl Feature {
 
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
-        self.dtype != Dtype::String
+        !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video)
     }
 }

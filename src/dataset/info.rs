@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use serde::ser::SerializeMap as _;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::layout::CHUNK_FILES;
+use crate::dataset::pictures::PictureStatistics;
 use crate::dataset::statistics::FeatureStatistics;
 
 /// The format that `meta/` and `data/` follow.
@@ -44,6 +46,37 @@ pub(crate) struct FeatureInfo {
     pub(crate) dtype: Dtype,
     pub(crate) shape: Vec<usize>,
     pub(crate) names: Option<Vec<String>>,
+    /// Of videos alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) info: Option<CameraInfo>,
+}
+
+/// What `LeRobot` wants to know of a video.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CameraInfo {
+    #[serde(rename = "video.height")]
+    height: u32,
+    #[serde(rename = "video.width")]
+    width: u32,
+    #[serde(rename = "video.codec")]
+    codec: String,
+    #[serde(rename = "video.pix_fmt")]
+    pix_fmt: String,
+    #[serde(rename = "video.is_depth_map")]
+    is_depth_map: bool,
+    #[serde(rename = "video.fps")]
+    fps: u32,
+    #[serde(rename = "video.channels")]
+    channels: u32,
+    has_audio: bool,
+}
+
+impl CameraInfo {
+    /// Of a video in H.264.
+    pub(crate) fn h264([width, height]: [u32; 2], fps: u32) -> Self {
+        let (codec, pix_fmt) = ("h264".to_owned(), "yuv420p".to_owned());
+        Self { height, width, codec, pix_fmt, is_depth_map: false, fps, channels: 3, has_audio: false }
+    }
 }
 
 /// What a dataset counts.
@@ -87,16 +120,22 @@ impl Info {
 /// A feature as it is declared where slots have these names.
 pub(crate) fn declared(feature: &Feature, slots: &[String]) -> (String, FeatureInfo) {
     let shape = vec![feature.width(slots.len())];
-    (feature.name.to_owned(), FeatureInfo { dtype: feature.dtype, shape, names: feature.value_names(slots) })
+    (
+        feature.name.to_owned(),
+        FeatureInfo { dtype: feature.dtype, shape, names: feature.value_names(slots), info: None },
+    )
 }
 
-/// `meta/stats.json`: statistics by feature, in the order of the columns.
+/// `meta/stats.json`: statistics by feature, in the order of the columns, then those of pictures.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Stats(pub(crate) Vec<(String, FeatureStatistics)>);
+pub(crate) struct Stats(pub(crate) Vec<(String, FeatureStatistics)>, pub(crate) Vec<(String, PictureStatistics)>);
 
 impl Serialize for Stats {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, statistics)| (name, statistics)))
+        let mut map = serializer.serialize_map(Some(self.0.len() + self.1.len()))?;
+        self.0.iter().try_for_each(|(name, statistics)| map.serialize_entry(name, statistics))?;
+        self.1.iter().try_for_each(|(name, statistics)| map.serialize_entry(name, statistics))?;
+        map.end()
     }
 }
 

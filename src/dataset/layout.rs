@@ -43,6 +43,11 @@ impl FilePlace {
         root.join(self.relative(folder))
     }
 
+    /// The video file of a feature.
+    pub(crate) fn video(self, feature: &str) -> String {
+        format!("videos/{feature}/chunk-{:03}/file-{:03}.mp4", self.chunk, self.file)
+    }
+
     pub(crate) fn next(self) -> Self {
         if self.file + 1 < CHUNK_FILES {
             Self { chunk: self.chunk, file: self.file + 1 }

@@ -10,6 +10,7 @@ use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::episodes::{EpisodePlaces, MetaRows, ProvenanceRows, Source};
 use crate::dataset::frames::{EpisodeIds, FrameRows};
 use crate::dataset::info::{Info, NTP_VERSION, NtpInfo, Stats, Totals};
+use crate::dataset::pictures::PictureFeatures;
 use crate::dataset::rolling::RollingTable;
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
 use crate::dataset::statistics::{NumericFeature, Statistics};
@@ -17,6 +18,7 @@ use crate::dataset::text::TextTable;
 use crate::dataset::text_files::{write_subtasks, write_tasks};
 use crate::dataset::{ConvertError, ConvertSummary, layout};
 use crate::program::{Program, vocabulary_hash};
+use crate::recording::CameraPictures;
 use crate::table::{TableWriter, Values, WriteOptions};
 use crate::task::Family;
 use crate::trace::Episode;
@@ -29,6 +31,11 @@ pub(super) const SCOPE_GROUP_ROWS: usize = 1 << 15;
 pub(super) const EPISODE_GROUP_ROWS: usize = 1 << 12;
 pub(super) const MEGABYTE: usize = 1 << 20;
 
+/// The options of a table with further columns.
+fn with(further: Vec<String>, options: WriteOptions) -> WriteOptions {
+    WriteOptions { further, ..options }
+}
+
 /// Everything that can begin once the number of slots is known.
 pub(super) struct Tables {
     n_slots: usize,
@@ -40,6 +47,7 @@ pub(super) struct Tables {
     scopes: ScopeRows,
     provenance: ProvenanceRows,
     meta: MetaRows,
+    pictures: PictureFeatures,
     statistics: Statistics,
     data_files: RollingTable,
     call_files: RollingTable,
@@ -55,7 +63,13 @@ pub(super) struct Tables {
 
 impl Tables {
     /// Begins all of them, for scenes as the first episode's.
-    pub(super) fn create(root: &Path, config: &ConvertConfig, first: &Episode) -> Result<Self, ConvertError> {
+    pub(super) fn create(
+        root: &Path,
+        config: &ConvertConfig,
+        first: &Episode,
+        cameras: &[CameraPictures],
+    ) -> Result<Self, ConvertError> {
+        let pictures = PictureFeatures::new(root, config, cameras);
         let n_slots = first.scene.slots.len();
         let file_bytes = config.file_megabytes.get() as usize * MEGABYTE;
         let rolling = |folder, schema, options| RollingTable::new(root, folder, schema, options, file_bytes);
@@ -70,10 +84,15 @@ impl Tables {
             provenance: ProvenanceRows::default(),
             meta: MetaRows::default(),
             statistics: Statistics::new(root, NumericFeature::all(n_slots)),
-            data_files: rolling(layout::DATA, FRAMES, FrameRows::options(n_slots)),
+            data_files: rolling(layout::DATA, FRAMES, with(pictures.data_schema(), FrameRows::options(n_slots))),
             call_files: rolling(layout::CALLS, CALLS, CallRows::options()),
             scope_files: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),
-            meta_files: rolling(layout::META_EPISODES, META_EPISODES, MetaRows::options()),
+            meta_files: rolling(
+                layout::META_EPISODES,
+                META_EPISODES,
+                with(pictures.meta_schema(), MetaRows::options()),
+            ),
+            pictures,
             provenance_file: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, WriteOptions::default())?,
             n_episodes: 0,
             n_frames: 0,
@@ -84,8 +103,15 @@ impl Tables {
     }
 
     /// Adds an episode, and writes the row groups that are full.
-    pub(super) fn append(&mut self, view: &EpisodeView<'_>, source: Source<'_>, fps: u32) -> Result<(), ConvertError> {
+    pub(super) fn append(
+        &mut self,
+        view: &EpisodeView<'_>,
+        cameras: &[CameraPictures],
+        source: Source<'_>,
+        fps: u32,
+    ) -> Result<(), ConvertError> {
         self.note_scene(view)?;
+        self.pictures.append(view, cameras)?;
         let places = EpisodePlaces {
             episode_index: self.n_episodes as i64,
             data: self.data_files.place(),
@@ -127,7 +153,7 @@ impl Tables {
     }
 
     fn write_full_groups(&mut self) -> Result<(), ConvertError> {
-        if self.frames.n_rows() >= GROUP_ROWS {
+        if self.frames.n_rows() >= GROUP_ROWS || self.pictures.are_many() {
             self.write_frames()?;
         }
         if self.calls.n_rows() >= GROUP_ROWS {
@@ -145,8 +171,10 @@ impl Tables {
     fn write_frames(&mut self) -> Result<(), ConvertError> {
         let columns = self.frames.columns();
         self.statistics.keep(&columns, self.frames.n_rows())?;
+        let columns: Vec<(&str, Values<'_>)> = columns.into_iter().chain(self.pictures.data_columns()).collect();
         self.data_files.write_row_group(&columns)?;
         self.frames.clear();
+        self.pictures.clear_rows();
         Ok(())
     }
 
@@ -165,7 +193,9 @@ impl Tables {
     fn write_episodes(&mut self) -> Result<(), ConvertError> {
         let mut columns: Vec<(&str, Values<'_>)> = self.meta.columns().into();
         columns.extend(self.statistics.columns());
+        columns.extend(self.pictures.meta_columns());
         self.meta_files.write_row_group(&columns)?;
+        self.pictures.clear_episodes();
         self.provenance_file.write_row_group(&self.provenance.columns())?;
         self.meta.clear();
         self.statistics.clear();
@@ -185,19 +215,19 @@ impl Tables {
         write_subtasks(root, self.frames.subtasks())?;
         let tasks = self.tasks.texts().len() as u64;
         let totals = Totals { episodes: self.n_episodes, frames: self.n_frames, tasks };
-        write_json(
-            &root.join(layout::INFO),
-            &Info::new(totals, &self.slots, config.fps.get(), config.file_megabytes.get()),
-        )?;
+        let mut info = Info::new(totals, &self.slots, config.fps.get(), config.file_megabytes.get());
+        info.features.0.extend(self.pictures.declared());
+        write_json(&root.join(layout::INFO), &info)?;
         write_json(&root.join(layout::NTP_INFO), &self.ntp_info(config, failed_left_out))?;
-        let Self { n_episodes, n_frames, n_calls, n_scopes, n_failed, statistics, .. } = self;
+        let Self { n_episodes, n_frames, n_calls, n_scopes, n_failed, statistics, pictures, .. } = self;
         let data_files = self.data_files.finish()?;
         self.provenance_file.commit()?;
         let stats = statistics.finish()?;
-        write_json(&root.join(layout::STATS), &Stats(stats))?;
+        write_json(&root.join(layout::STATS), &Stats(stats, pictures.statistics()))?;
         let single = [layout::INFO, layout::STATS, layout::TASKS, layout::SUBTASKS, layout::NTP_INFO, layout::EPISODES];
         let mut files: Vec<String> = single.map(ToOwned::to_owned).into();
         files.extend(data_files);
+        files.extend(pictures.finish()?);
         files.extend(self.call_files.finish()?);
         files.extend(self.scope_files.finish()?);
         files.extend(self.meta_files.finish()?);

@@ -6,6 +6,7 @@
 mod episode;
 mod frames;
 mod meta;
+mod pictures;
 mod scopes;
 
 use std::path::Path;
@@ -36,6 +37,7 @@ pub fn validate(root: &Path) -> Validation {
     if let Err(error) = check_episodes(root, texts, &mut validation) {
         validation.failed("episodes.row", &error);
     }
+    pictures::check(root, &mut validation);
     validation
 }
 

@@ -10,6 +10,7 @@ use crate::dataset::config::{ConvertConfig, FailedEpisodes, FrameChoice};
 use crate::dataset::episode_view::{EpisodeView, ViewBuffers};
 use crate::dataset::episodes::Source;
 use crate::dataset::tables::Tables;
+use crate::recording::{CameraPictures, Pictured};
 use crate::trace::{Boundaries, Episode};
 
 /// What was written.
@@ -68,8 +69,35 @@ impl DatasetWriter {
         if !self.is_wanted(episode) {
             return Ok(());
         }
+        self.append_with(episode, &[], file, sha256)
+    }
+
+    /// Adds an episode with what cameras saw of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`DatasetWriter::append`]; when its cameras are others than before, or a picture is damaged.
+    pub fn append_pictured(
+        &mut self,
+        pictured: &Pictured<Episode>,
+        file: &str,
+        sha256: &str,
+    ) -> Result<(), ConvertError> {
+        if !self.is_wanted(&pictured.episode) {
+            return Ok(());
+        }
+        self.append_with(&pictured.episode, &pictured.cameras, file, sha256)
+    }
+
+    fn append_with(
+        &mut self,
+        episode: &Episode,
+        cameras: &[CameraPictures],
+        file: &str,
+        sha256: &str,
+    ) -> Result<(), ConvertError> {
         let view = self.buffers.view(episode, self.config.frames)?;
-        append(&mut self.tables, &self.root, &self.config, &view, Source { file, sha256 })
+        append(&mut self.tables, &self.root, &self.config, &view, cameras, Source { file, sha256 })
     }
 
     /// Adds an episode of which only the boundary frames were read.
@@ -78,6 +106,30 @@ impl DatasetWriter {
     ///
     /// As [`DatasetWriter::append`]; when there are frames between the boundaries, and they should be rows.
     pub fn append_boundaries(&mut self, boundaries: &Boundaries, file: &str, sha256: &str) -> Result<(), ConvertError> {
+        self.append_boundaries_with(boundaries, &[], file, sha256)
+    }
+
+    /// Adds the boundary frames of an episode with what cameras saw at them.
+    ///
+    /// # Errors
+    ///
+    /// As [`DatasetWriter::append_boundaries`] and [`DatasetWriter::append_pictured`].
+    pub fn append_pictured_boundaries(
+        &mut self,
+        pictured: &Pictured<Boundaries>,
+        file: &str,
+        sha256: &str,
+    ) -> Result<(), ConvertError> {
+        self.append_boundaries_with(&pictured.episode, &pictured.cameras, file, sha256)
+    }
+
+    fn append_boundaries_with(
+        &mut self,
+        boundaries: &Boundaries,
+        cameras: &[CameraPictures],
+        file: &str,
+        sha256: &str,
+    ) -> Result<(), ConvertError> {
         let (episode, recorded) = (boundaries.episode(), boundaries.recorded());
         if self.config.frames == FrameChoice::All && recorded.positions.len() != recorded.count as usize {
             return Err(ConvertError::FramesMissing { episode: episode.provenance.index });
@@ -86,7 +138,7 @@ impl DatasetWriter {
             return Ok(());
         }
         let view = self.buffers.view_boundaries(boundaries);
-        append(&mut self.tables, &self.root, &self.config, &view, Source { file, sha256 })
+        append(&mut self.tables, &self.root, &self.config, &view, cameras, Source { file, sha256 })
     }
 
     /// Whether an episode is to be written; one that is not is counted.
@@ -114,13 +166,14 @@ fn append(
     root: &Path,
     config: &ConvertConfig,
     view: &EpisodeView<'_>,
+    cameras: &[CameraPictures],
     source: Source<'_>,
 ) -> Result<(), ConvertError> {
     let mut begun = match tables.take() {
         Some(begun) => begun,
-        None => Tables::create(root, config, view.episode)?,
+        None => Tables::create(root, config, view.episode, cameras)?,
     };
-    begun.append(view, source, config.fps.get())?;
+    begun.append(view, cameras, source, config.fps.get())?;
     *tables = Some(begun);
     Ok(())
 }

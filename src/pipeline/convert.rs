@@ -32,9 +32,10 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         context.go_on()
     };
     let source = Source { recordings: &recordings, files: &manifest.files, config: &context.pipeline.spec.convert };
+    let boundaries = |reader: ShardReader| reader.boundaries().pictured();
     let summary = match source.config.frames {
-        FrameChoice::Boundaries => source.convert(partial.path(), ShardReader::boundaries, step),
-        FrameChoice::All => source.convert(partial.path(), |reader| reader, step),
+        FrameChoice::Boundaries => source.convert(partial.path(), boundaries, step),
+        FrameChoice::All => source.convert(partial.path(), ShardReader::pictured, step),
     };
     context.go_on()?;
     let summary = summary?;

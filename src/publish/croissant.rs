@@ -105,6 +105,7 @@ fn field(table: &TableFacts, column: &ColumnFacts) -> Option<Value> {
         CellValue::Float64 => "cr:Float64",
         CellValue::Boolean => "sc:Boolean",
         CellValue::Text => "sc:Text",
+        CellValue::Picture => "sc:ImageObject",
     };
     let mut field = Map::new();
     let id = format!("{}/{}", table.name, column.name);

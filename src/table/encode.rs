@@ -48,7 +48,13 @@ impl Encoder {
             Values::Int64Vector(values, width) => self.vectors::<Int64Type>(column, values, width),
             Values::Float32Vector(values, width) => self.vectors::<FloatType>(column, values, width),
             Values::Float64Vector(values, width) => self.vectors::<DoubleType>(column, values, width),
+            Values::Pictures(rows) => self.optional_texts(column, rows.iter().map(|row| Some(row.clone().into()))),
         }
+    }
+
+    /// Writes a column of so many rows that all hold nothing.
+    pub(super) fn write_nothing(&mut self, column: &mut SerializedColumnWriter<'_>, n_rows: usize) -> Result<()> {
+        self.optional_texts(column, std::iter::repeat_n(None, n_rows))
     }
 
     fn optional<T: DataType>(&mut self, column: &mut SerializedColumnWriter<'_>, rows: &[Option<T::T>]) -> Result<()> {

@@ -18,6 +18,8 @@ pub enum Value {
     Boolean,
     /// UTF-8.
     Text,
+    /// An encoded picture: `LeRobot`'s struct of bytes and path.
+    Picture,
 }
 
 /// How many values a row has.
@@ -51,6 +53,9 @@ impl ColumnKind {
             };
             return Some(Self { value: value_of(field)?, form });
         }
+        if is_picture(field) {
+            return Some(Self { value: Value::Picture, form: Form::Required });
+        }
         let is_list = field.get_basic_info().converted_type() == ConvertedType::LIST
             || matches!(field.get_basic_info().logical_type_ref(), Some(LogicalType::List));
         let [list] = field.get_fields() else { return None };
@@ -66,6 +71,13 @@ impl ColumnKind {
     pub(crate) fn can_be_read_as(self, expected: Self) -> bool {
         self.value == expected.value && (self.form == Form::List) == (expected.form == Form::List)
     }
+}
+
+/// Bytes, and a path that is not used.
+fn is_picture(field: &Type) -> bool {
+    let [bytes, path] = field.get_fields() else { return false };
+    let is_bytes = |field: &Type| field.is_primitive() && field.get_physical_type() == PhysicalType::BYTE_ARRAY;
+    bytes.name() == "bytes" && path.name() == "path" && is_bytes(bytes) && is_bytes(path)
 }
 
 fn value_of(field: &Type) -> Option<Value> {
@@ -91,6 +103,7 @@ impl fmt::Display for Value {
             Self::Float64 => "float64",
             Self::Boolean => "boolean",
             Self::Text => "text",
+            Self::Picture => "picture",
         })
     }
 }

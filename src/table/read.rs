@@ -34,6 +34,58 @@ pub fn read(path: &Path, schema: &TableSchema) -> Result<Columns, TableError> {
     Ok(Columns::new(path, schema.name(), columns))
 }
 
+/// Reads columns that a schema text does not have, whole.
+///
+/// # Errors
+///
+/// As [`read`].
+pub(crate) fn read_further(
+    path: &Path,
+    schema: &TableSchema,
+    columns: &[(String, ColumnKind)],
+) -> Result<Columns, TableError> {
+    let open = || TableReader::open_kinds(path, schema.name(), columns.to_vec());
+    let mut reader = guarded(path, open)?;
+    let mut columns = reader.empty_columns();
+    while reader.append_batch(&mut columns)? {}
+    Ok(Columns::new(path, schema.name(), columns))
+}
+
+/// Reads the encoded pictures of some rows.
+///
+/// # Errors
+///
+/// As [`read`]; when there are fewer rows, or a row has no picture.
+pub(crate) fn read_pictures(
+    path: &Path,
+    schema: &TableSchema,
+    name: &str,
+    rows: std::ops::Range<usize>,
+) -> Result<Vec<Vec<u8>>, TableError> {
+    guarded(path, || {
+        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder =
+            ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
+        let kind = ColumnKind { value: Value::Picture, form: Form::Required };
+        let roots = find_roots(path, schema.name(), &[(name.to_owned(), kind)], builder.metadata())?;
+        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
+        let builder = builder.with_projection(mask).with_offset(rows.start).with_limit(rows.len());
+        let mut pictures = Vec::with_capacity(rows.len());
+        for batch in builder.build().map_err(TableError::parquet(path))? {
+            let batch = batch.map_err(TableError::arrow(path))?;
+            let column = batch.column(0).as_struct_opt().and_then(|fields| fields.column_by_name("bytes"));
+            let bytes = column.and_then(|column| column.as_binary_opt::<i32>());
+            pictures.extend(bytes.into_iter().flatten().flatten().map(<[u8]>::to_vec));
+        }
+        if pictures.len() == rows.len() {
+            return Ok(pictures);
+        }
+        let (column, row) = (name.to_owned(), (rows.start + pictures.len()) as u64);
+        Err(TableError::Null { path: path.to_owned(), schema: schema.name(), column, row })
+    })
+}
+
 /// Reads a table in batches of some thousand rows.
 pub struct TableReader {
     path: PathBuf,
@@ -57,17 +109,20 @@ impl TableReader {
     fn open_unguarded(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
         let parsed = schema.parse()?;
         let named = |name: &&str| parsed.columns.iter().find(|(column, _)| column == name).cloned();
-        let columns: Vec<_> = names.iter().filter_map(named).collect();
+        Self::open_kinds(path, schema.name(), names.iter().filter_map(named).collect())
+    }
+
+    fn open_kinds(path: &Path, schema: &'static str, columns: Vec<(String, ColumnKind)>) -> Result<Self, TableError> {
         let file = File::open(path).map_err(IoError::system("open", path))?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let builder =
             ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
-        let roots = find_roots(path, schema.name(), &columns, builder.metadata())?;
+        let roots = find_roots(path, schema, &columns, builder.metadata())?;
         let footer = Arc::clone(builder.metadata());
         let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
         let reader =
             builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(TableError::parquet(path))?;
-        Ok(Self { path: path.to_owned(), schema: schema.name(), columns, reader, footer, rows_read: 0 })
+        Ok(Self { path: path.to_owned(), schema, columns, reader, footer, rows_read: 0 })
     }
 
     /// Rows of the file, as its footer says.

@@ -55,8 +55,15 @@ impl TableSchema {
     }
 
     pub(crate) fn parse(&self) -> Result<ParsedSchema, TableError> {
+        self.parse_with(&[])
+    }
+
+    /// With further columns behind its own, given as lines of the message text.
+    pub(crate) fn parse_with(&self, further: &[String]) -> Result<ParsedSchema, TableError> {
         let problem = |problem: String| TableError::Schema { schema: self.name, problem };
-        let root = parse_message_type(self.text).map_err(|error| problem(error.to_string()))?;
+        let body = self.text.trim_end().strip_suffix('}').unwrap_or(self.text);
+        let text = format!("{body}{}}}", further.concat());
+        let root = parse_message_type(&text).map_err(|error| problem(error.to_string()))?;
         if root.name() != self.name {
             return Err(problem(format!("the message is called {:?}", root.name())));
         }

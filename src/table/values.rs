@@ -28,6 +28,8 @@ pub(crate) enum Values<'a> {
     Float32Vector(&'a [f32], usize),
     /// The same of doubles.
     Float64Vector(&'a [f64], usize),
+    /// Encoded pictures.
+    Pictures(&'a [Vec<u8>]),
 }
 
 impl<'a> Values<'a> {
@@ -66,6 +68,7 @@ impl<'a> Values<'a> {
             Self::Text(_) | Self::Word(..) => (Form::Required, Value::Text),
             Self::OptionalText(_) | Self::OptionalWord(..) => (Form::Optional, Value::Text),
             Self::TextList(_) => (Form::List, Value::Text),
+            Self::Pictures(_) => (Form::Required, Value::Picture),
         };
         ColumnKind { value, form }
     }
@@ -91,6 +94,7 @@ impl<'a> Values<'a> {
             Self::Int64Vector(values, width) => values.len() / width,
             Self::Float32Vector(values, width) => values.len() / width,
             Self::Float64Vector(values, width) => values.len() / width,
+            Self::Pictures(rows) => rows.len(),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::artifact::AtomicFile;
 use crate::table::encode::Encoder;
 use crate::table::schema::ParsedSchema;
 use crate::table::values::Values;
-use crate::table::{Column, ColumnKind, TableError, TableSchema};
+use crate::table::{Column, ColumnKind, TableError, TableSchema, Value};
 
 /// Named in every file. The same for every run of this version.
 const CREATED_BY: &str = concat!("ntp version ", env!("CARGO_PKG_VERSION"));
@@ -50,6 +50,8 @@ pub(crate) struct WriteOptions {
     /// Columns that the rows are sorted by. Where there are any, only these have minima and maxima in the file: they
     /// let a reader skip pages, the others' would not.
     pub(crate) sorted_by: Vec<&'static str>,
+    /// Columns behind those of the schema, as lines of Parquet's message text.
+    pub(crate) further: Vec<String>,
     /// Further entries of the file's key-value metadata.
     pub(crate) metadata: Vec<(String, String)>,
 }
@@ -65,7 +67,7 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub(crate) fn create(path: &Path, schema: &TableSchema, options: WriteOptions) -> Result<Self, TableError> {
-        let mut parsed = schema.parse()?.with_list_lengths(&options.list_lengths);
+        let mut parsed = schema.parse_with(&options.further)?.with_list_lengths(&options.list_lengths);
         // Where there is an Arrow schema in a file, pyarrow and pandas read metadata from it alone.
         parsed.arrow = parsed.arrow.with_metadata(options.metadata.iter().cloned().collect());
         let properties = Arc::new(properties(&parsed, options));
@@ -87,6 +89,13 @@ impl TableWriter {
             let Some(mut column) = group.next_column().map_err(&failed)? else { break };
             self.encoder.write(&mut column, values).map_err(&failed)?;
             column.close().map_err(&failed)?;
+            // A picture has a second leaf, its path.
+            if let Values::Pictures(rows) = values
+                && let Some(mut path) = group.next_column().map_err(&failed)?
+            {
+                self.encoder.write_nothing(&mut path, rows.len()).map_err(&failed)?;
+                path.close().map_err(&failed)?;
+            }
         }
         group.close().map_err(&failed)?;
         Ok(())
@@ -177,6 +186,10 @@ pub(super) fn properties(parsed: &ParsedSchema, options: WriteOptions) -> Writer
         let name = leaf.parts().first().map_or("", String::as_str);
         if parsed.is_float_list(name) || options.plain.contains(&name) || options.delta_encoded.contains(&name) {
             builder = builder.set_column_dictionary_enabled(leaf.clone(), false);
+        }
+        if parsed.find(name).is_some_and(|(_, kind)| kind.value == Value::Picture) {
+            builder = builder.set_column_dictionary_enabled(leaf.clone(), false);
+            builder = builder.set_column_compression(leaf.clone(), Compression::UNCOMPRESSED);
         }
         if options.delta_encoded.contains(&name) {
             builder = builder.set_column_encoding(leaf.clone(), Encoding::DELTA_BINARY_PACKED);

@@ -36,7 +36,8 @@ impl H264Encoder {
             .max_frame_rate(FrameRate::from_hz(fps as f32))
             .rate_control_mode(RateControlMode::Quality)
             .qp(QpRange::new(QUANTISATION[0], QUANTISATION[1]))
-            .skip_frames(false)
+            // Never with so many bits; without it the encoder complains on stderr.
+            .skip_frames(true)
             .scene_change_detect(false)
             .adaptive_quantization(false)
             .background_detection(false)
@@ -65,7 +66,11 @@ impl H264Encoder {
         }
         let millis = self.n_encoded * 1000 / u64::from(self.fps.max(1));
         let encoded = self.encoder.encode_at(&self.yuv, Timestamp::from_millis(millis));
+        let before = packet.len();
         encoded.map_err(|error| failed(&error))?.write_vec(packet);
+        if packet.len() == before {
+            return Err(failed(&"the encoder skipped a picture"));
+        }
         self.n_encoded += 1;
         Ok(())
     }

@@ -23,6 +23,10 @@ const MAX_SIDE_PX: u32 = 1 << 14;
 ///
 /// When the bytes are not as many as the size says.
 pub fn encode_png(rgb: &[u8], [width, height]: [u32; 2], png: &mut Vec<u8>) -> Result<(), VideoError> {
+    if rgb.len() != width as usize * height as usize * 3 {
+        let message = format!("{} bytes for {width}x{height} pixels", rgb.len());
+        return Err(VideoError::codec("encode", "PNG")(&message));
+    }
     let encoder = PngEncoder::new_with_quality(png, CompressionType::Fast, FilterType::Up);
     let written = encoder.write_image(rgb, width, height, ExtendedColorType::Rgb8);
     written.map_err(|error| VideoError::codec("encode", "PNG")(&error))

@@ -64,6 +64,10 @@ fn has_predictions(replays: &[Replay<'_>]) -> bool {
 fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeError> {
     let scene = layout.view("3D", "Scene", "world", &["/world/**"])?;
     put_camera(layout, scene, replays)?;
+    let front = layout.view("2D", "Camera in front", "camera/front", &["/camera/front"])?;
+    let wrist = layout.view("2D", "Camera on the gripper", "camera/wrist", &["/camera/wrist"])?;
+    let cameras = layout.split(ContainerKind::Vertical, &[front, wrist], &[0.5, 0.5])?;
+    let scene = layout.split(ContainerKind::Horizontal, &[scene, cameras], &[0.68, 0.32])?;
     let paired = replays.iter().any(|replay| replay.demonstration.is_some());
     let (name, contents): (&str, &[&str]) = if paired {
         ("Running programs, and those of the demonstration", &["/agreement", "/programs/**", "/programs_of_expert/**"])

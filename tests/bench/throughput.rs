@@ -13,7 +13,7 @@ use ntp::dataset::{ConvertConfig, DatasetTrials, RecordingEpisodes, convert, rea
 use ntp::expert::demonstrate;
 use ntp::model::{Decoder, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
-use ntp::render::{Camera, Look, Renderer};
+use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
@@ -38,6 +38,9 @@ fn main() {
     let bench = Bench { folder: folder.path().to_owned() };
     if ["render_64", "render_224"].into_iter().any(wanted) {
         render();
+    }
+    if ["generate_stacking_video_64", "convert_images_64"].into_iter().any(wanted) {
+        bench.videos();
     }
     if wanted("generate_sorting_40") {
         bench.generate_sorting_40();
@@ -136,6 +139,36 @@ impl Bench {
         });
         report("generate_stacking", n_episodes as f64 / secs, "demonstrations per CPU-second");
         report("generate_stacking_success", 1.0 - failed as f64 / n_episodes as f64, "share");
+    }
+
+    /// Demonstrations with a camera of 64 pixels: all frames as H.264, and boundary frames as PNG to a dataset.
+    fn videos(&self) {
+        let tasks = stacking_tasks();
+        let seen: Vec<&Task> = tasks.of_split(Split::Seen).collect();
+        let camera = CameraConfig::new(Viewpoint::Front, [64, 64]);
+        let n_episodes = 100_u64;
+        let generate = |name: &str, format: PictureFormat, frame_hz: u32| {
+            let path = self.folder.join(name);
+            let writer = ShardWriter::create(&path, "{}").expect("the folder can be written");
+            let mut writer = writer.with_cameras(&[CameraConfig { format, ..camera.clone() }]);
+            for index in 0..n_episodes {
+                let task = seen[index as usize % seen.len()];
+                let episode = demonstration(task, &trial(task, 0, 1), index, frame_hz);
+                writer.write(&episode).expect("the recording can be written");
+            }
+            writer.finish().expect("the recording can be written");
+            path
+        };
+        let (_, secs) = cpu_secs(|| generate("video.mcap", PictureFormat::H264, 10));
+        report("generate_stacking_video_64", n_episodes as f64 / secs, "demonstrations per CPU-second");
+        let path = generate("images.mcap", PictureFormat::Png, 0);
+        let episodes = ShardReader::open(&path).expect("the recording can be read").boundaries().pictured();
+        let (file, sha256) = ("images.mcap".to_owned(), String::new());
+        let recording = Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes });
+        let out = self.folder.join("images");
+        let (_, secs) =
+            cpu_secs(|| convert([recording], &ConvertConfig::default(), &out).expect("it can be converted"));
+        report("convert_images_64", n_episodes as f64 / secs, "episodes per CPU-second");
     }
 
     /// Demonstrations with 40 objects, boundary frames, to MCAP.

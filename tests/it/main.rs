@@ -11,6 +11,8 @@ mod dataset;
 #[cfg(test)]
 mod dataset_edit;
 #[cfg(test)]
+mod dataset_pictures;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;

@@ -65,7 +65,7 @@ fn h264_gives_back_nearly_what_went_in_picture_by_picture() {
     for (picture, packet) in pictures.iter().zip(packets(&pictures)) {
         decoder.decode(&packet, &mut decoded).unwrap();
         let difference = mean_difference(picture, &decoded);
-        assert!(difference < 4.0, "mean difference {difference}");
+        assert!(difference < 6.0, "mean difference {difference}");
     }
 }
 
@@ -107,7 +107,7 @@ fn mp4_gives_back_every_packet_at_its_time() {
         assert_eq!(sample.is_key, position % 4 == 0);
         reader.read(position, &mut packet).unwrap();
         decoder.decode(&packet, &mut decoded).unwrap();
-        assert!(mean_difference(picture, &decoded) < 4.0);
+        assert!(mean_difference(picture, &decoded) < 6.0);
     }
     assert!(reader.read(packets.len(), &mut packet).is_err());
 }

@@ -187,6 +187,8 @@ fn a_recording_has_scene_programs_scopes_and_words_on_two_timelines() {
         "/__properties",
         "/__properties/episode",
         "/calls",
+        "/camera/front",
+        "/camera/wrist",
         "/episode",
         "/observation/block_A",
         "/probability/end_of_program/depth_3",

@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::source::{FILES, Source};
 use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::feature::Dtype;
 use crate::dataset::info::{LEROBOT_VERSION, NTP_VERSION};
 use crate::dataset::layout::{self, FilePlace};
 use crate::program::vocabulary_hash;
@@ -23,6 +24,10 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
     if ntp.schema_version != NTP_VERSION {
         let problem = format!("schema_version is {}, but {NTP_VERSION} is edited", ntp.schema_version);
         return refused("edit.version", layout::NTP_INFO, problem);
+    }
+    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| feature.dtype == Dtype::Video) {
+        let problem = format!("feature {name:?} is a video, and videos cannot be edited; images can");
+        return refused("edit.video", layout::INFO, problem);
     }
     if ntp.vocabulary_hash != vocabulary_hash() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();

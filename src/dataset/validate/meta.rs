@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
-use crate::dataset::DatasetError;
-use crate::dataset::feature::{FEATURES, Feature};
+use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::finding::Validation;
 use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES, SUBTASKS, TASKS};
 use crate::dataset::statistics::FeatureStatistics;
+use crate::dataset::{DatasetError, EpisodePictures};
 use crate::program::vocabulary_hash;
 use crate::table::{self, Columns, TableError, TableReader};
 
@@ -108,7 +108,8 @@ fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validati
         }
     }
     let known: BTreeSet<_> = FEATURES.iter().map(|feature| feature.name).collect();
-    for name in declared.keys().filter(|name| !known.contains(*name)) {
+    let is_picture = |name: &&str| declared.get(name).is_some_and(|of| matches!(of.dtype, Dtype::Image | Dtype::Video));
+    for name in declared.keys().filter(|name| !known.contains(*name) && !is_picture(name)) {
         validation.warn(
             "info.features",
             &path,
@@ -171,7 +172,17 @@ fn check_pandas_index(root: &Path, file: &str, schema: &table::TableSchema, text
 /// Checks that every numeric feature has statistics in order; returns the range of observations.
 fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Option<(Vec<f64>, Vec<f64>)> {
     let path = root.join(layout::STATS);
-    let stats: BTreeMap<String, FeatureStatistics> = match read_json(&path) {
+    let is_picture = |name: &String| {
+        let declared = info.features.0.iter().find(|(feature, _)| feature == name);
+        declared.is_some_and(|(_, declared)| matches!(declared.dtype, Dtype::Image | Dtype::Video))
+    };
+    let all: Result<BTreeMap<String, serde_json::Value>, _> = read_json(&path);
+    let numeric = all.map(|all| {
+        let numeric = all.into_iter().filter(|(name, _)| !is_picture(name));
+        let parsed = numeric.filter_map(|(name, value)| Some((name, serde_json::from_value(value).ok()?)));
+        parsed.collect::<BTreeMap<String, FeatureStatistics>>()
+    });
+    let stats = match numeric {
         Ok(stats) => stats,
         Err(error) => {
             validation.failed("stats.value", &error.into());
@@ -276,9 +287,12 @@ pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &
         let message = "no episode is in this file, but readers that take all files of the folder would read it";
         validation.error("file.unlisted", path, String::new(), message.to_owned());
     }
+    let images: Vec<String> = EpisodePictures::features(root).unwrap_or_default();
     for path in &listed {
         let Ok(reader) = TableReader::open_columns(path, &FRAMES, &["index"]) else { continue };
-        let known = |name: &&str| FEATURES.iter().any(|feature| feature.name == *name);
+        let known = |name: &&str| {
+            FEATURES.iter().any(|feature| feature.name == *name) || images.iter().any(|image| image == name)
+        };
         if let Some(name) = reader.file_columns().find(|name| !known(name)) {
             let message = format!("column {name:?} is not declared in {}", layout::INFO);
             validation.error("file.undeclared", path, String::new(), message);

@@ -45,7 +45,7 @@ fn is_right(pictures: &CameraPictures, config: &CameraConfig, episode: &Episode)
             PictureFormat::H264 => H264Decoder::new().unwrap().decode(bytes, &mut found).unwrap(),
         }
         let difference: u64 = found.bytes.iter().zip(expected).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
-        let most = if pictures.format == PictureFormat::Png { 0 } else { 4 * expected.len() as u64 };
+        let most = if pictures.format == PictureFormat::Png { 0 } else { 8 * expected.len() as u64 };
         assert!(difference <= most, "{}: difference {difference}", pictures.camera);
     }
 }

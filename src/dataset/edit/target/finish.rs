@@ -26,7 +26,7 @@ impl Target {
             files.extend(table.finish()?);
         }
         self.provenance_file.commit()?;
-        write_json(&root.join(layout::STATS), &Stats(statistics.finish()?))?;
+        write_json(&root.join(layout::STATS), &Stats(statistics.finish()?, Vec::new()))?;
         files.sort_unstable();
         summary.tasks = tasks.texts().len() as u64;
         summary.files = files;
