@@ -16,6 +16,9 @@ pub(crate) enum Dtype {
     Int64,
     Bool,
     String,
+    /// Of others: pictures, videos, language and numbers of other sizes.
+    #[serde(other)]
+    Other,
 }
 
 /// How many values a row has.
@@ -88,6 +91,6 @@ impl Feature {
 
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
-        self.dtype != Dtype::String
+        !matches!(self.dtype, Dtype::String | Dtype::Other)
     }
 }
