@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::layout::CHUNK_FILES;
@@ -43,7 +43,14 @@ pub(crate) struct Features(pub(crate) Vec<(String, FeatureInfo)>);
 pub(crate) struct FeatureInfo {
     pub(crate) dtype: Dtype,
     pub(crate) shape: Vec<usize>,
+    #[serde(default, deserialize_with = "names_of_values")]
     pub(crate) names: Option<Vec<String>>,
+}
+
+/// Others also give names as a map of lists, which say nothing that is needed here.
+fn names_of_values<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<String>>, D::Error> {
+    let names = serde_json::Value::deserialize(deserializer)?;
+    Ok(serde_json::from_value(names).unwrap_or_default())
 }
 
 /// What a dataset counts.
@@ -116,4 +123,7 @@ pub(crate) struct NtpInfo {
     pub(crate) total_calls: u64,
     pub(crate) total_scopes: u64,
     pub(crate) failed_left_out: u64,
+    /// What its programs were read from where they were annotated elsewhere: they are texts then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) annotated_by: Option<String>,
 }

@@ -15,6 +15,8 @@ mod expert;
 #[cfg(test)]
 mod export;
 #[cfg(test)]
+mod import;
+#[cfg(test)]
 mod kinematic;
 #[cfg(test)]
 mod lineage;

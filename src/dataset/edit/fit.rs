@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::source::{FILES, Source};
 use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::feature::Dtype;
 use crate::dataset::info::{LEROBOT_VERSION, NTP_VERSION};
 use crate::dataset::layout::{self, FilePlace};
 use crate::program::vocabulary_hash;
@@ -27,6 +28,10 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
     if ntp.vocabulary_hash != vocabulary_hash() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
+    }
+    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| feature.dtype == Dtype::Other) {
+        let problem = format!("feature {name:?} is of a type that cannot be carried over");
+        return refused("edit.features", layout::INFO, problem);
     }
     Ok(())
 }
