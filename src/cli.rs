@@ -298,6 +298,21 @@ pub enum DatasetCommand {
     Diff(DiffArgs),
     /// Write the labels in the shapes that others read.
     Export(ExportArgs),
+    /// Bring in someone else's dataset whose frames are annotated by `subtask_index`.
+    Import(ImportArgs),
+}
+
+/// `ntp dataset import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// A `LeRobotDataset` v3.0 with `subtask_index` and `meta/subtasks.parquet`.
+    pub dataset: PathBuf,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `ntp dataset export`.

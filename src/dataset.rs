@@ -38,6 +38,7 @@ mod finding;
 mod frame_map;
 mod frame_rows;
 mod frames;
+pub mod import;
 mod info;
 mod layout;
 mod lookup;

@@ -334,7 +334,12 @@ impl StageDir {
 fn read_if_there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
     match read_json(path) {
         Ok(value) => Ok(Some(value)),
-        Err(IoError::System { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        // A recording by itself is no folder, and so has none of the three.
+        Err(IoError::System { source, .. })
+            if matches!(source.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) =>
+        {
+            Ok(None)
+        }
         Err(error) => Err(error),
     }
 }

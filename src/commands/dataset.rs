@@ -4,12 +4,13 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::cli::{DatasetCommand, DiffArgs, ExportArgs, FilterArgs, MergeArgs, SplitArgs};
+use crate::cli::{DatasetCommand, DiffArgs, ExportArgs, FilterArgs, ImportArgs, MergeArgs, SplitArgs};
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::edit::{
     ChangedEpisode, Condition, Difference, EditSummary, EpisodeName, SplitBy, Unit, diff, filter, merge, split,
 };
 use crate::dataset::export::{ExportSummary, export};
+use crate::dataset::import::{ImportSummary, import};
 
 pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
     match command {
@@ -18,6 +19,7 @@ pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
         DatasetCommand::Split(args) => run_split(args),
         DatasetCommand::Diff(args) => run_diff(args),
         DatasetCommand::Export(args) => run_export(args),
+        DatasetCommand::Import(args) => run_import(args),
     }
 }
 
@@ -102,6 +104,18 @@ fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
     } else {
         let ExportSummary { episodes, labels } = written;
         output::print(&format!("{}: {labels} labels of {episodes} episodes", args.to.display()))?;
+    }
+    Ok(CommandOutcome::Done)
+}
+
+fn run_import(args: &ImportArgs) -> anyhow::Result<CommandOutcome> {
+    let written = import(&args.dataset, &args.to)?;
+    if args.json {
+        output::print_json(&json!({ "path": args.to, "summary": written }))?;
+    } else {
+        let ImportSummary { episodes, frames, calls, subtasks, .. } = written;
+        let text = format!("{episodes} episodes, {frames} frames, {calls} calls of {subtasks} sub-tasks");
+        output::print(&format!("{}: {text}", args.to.display()))?;
     }
     Ok(CommandOutcome::Done)
 }

@@ -24,6 +24,8 @@ use serde::Serialize;
 use crate::artifact::StagedDir;
 use crate::dataset::edit::EditError;
 
+pub(in crate::dataset) use plain::{copy_files, with_columns};
+
 /// What labels are written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

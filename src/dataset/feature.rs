@@ -20,6 +20,9 @@ pub(crate) enum Dtype {
     Image,
     /// Pictures in video files beside the tables.
     Video,
+    /// Of others: language and numbers of other sizes.
+    #[serde(other)]
+    Other,
 }
 
 /// How many values a row has.
@@ -92,6 +95,6 @@ impl Feature {
 
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
-        !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video)
+        !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other)
     }
 }

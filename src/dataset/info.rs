@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::ser::SerializeMap as _;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::layout::CHUNK_FILES;
@@ -45,6 +45,7 @@ pub(crate) struct Features(pub(crate) Vec<(String, FeatureInfo)>);
 pub(crate) struct FeatureInfo {
     pub(crate) dtype: Dtype,
     pub(crate) shape: Vec<usize>,
+    #[serde(default, deserialize_with = "names_of_values")]
     pub(crate) names: Option<Vec<String>>,
     /// Of videos alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,6 +78,12 @@ impl CameraInfo {
         let (codec, pix_fmt) = ("h264".to_owned(), "yuv420p".to_owned());
         Self { height, width, codec, pix_fmt, is_depth_map: false, fps, channels: 3, has_audio: false }
     }
+}
+
+/// Others also give names as a map of lists, which say nothing that is needed here.
+fn names_of_values<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<String>>, D::Error> {
+    let names = serde_json::Value::deserialize(deserializer)?;
+    Ok(serde_json::from_value(names).unwrap_or_default())
 }
 
 /// What a dataset counts.
@@ -155,4 +162,7 @@ pub(crate) struct NtpInfo {
     pub(crate) total_calls: u64,
     pub(crate) total_scopes: u64,
     pub(crate) failed_left_out: u64,
+    /// What its programs were read from where they were annotated elsewhere: they are texts then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) annotated_by: Option<String>,
 }

@@ -273,6 +273,7 @@ impl Tables {
             total_calls: self.n_calls,
             total_scopes: self.n_scopes,
             failed_left_out,
+            annotated_by: None,
         }
     }
 }

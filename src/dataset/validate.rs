@@ -3,6 +3,7 @@
 //! All tables are read side by side, episode by episode. What breaks one table off (rows out of order, a file that is
 //! missing) ends the check of that table; the others go on.
 
+mod annotated;
 mod episode;
 mod frames;
 mod meta;
@@ -11,11 +12,12 @@ mod scopes;
 
 use std::path::Path;
 
+use crate::artifact::read_json;
 use crate::dataset::call_rows::{CallBatch, read_calls};
 use crate::dataset::cursor::Cursor;
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
 use crate::dataset::finding::Validation;
-use crate::dataset::info::Info;
+use crate::dataset::info::{Info, NtpInfo};
 use crate::dataset::read::{check_tree, n_slots};
 use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
 use crate::dataset::{DatasetError, layout};
@@ -33,6 +35,14 @@ use scopes::ScopeBatch;
 /// splits. It reads no recordings.
 pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
+    let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
+    if info.is_ok_and(|info| info.annotated_by.is_some()) {
+        let texts = meta::read_all_texts(root, &mut validation);
+        if let Err(error) = annotated::check(root, &texts, &mut validation) {
+            validation.failed("episodes.row", &error);
+        }
+        return validation;
+    }
     let texts = meta::check(root, &mut validation);
     if let Err(error) = check_episodes(root, texts, &mut validation) {
         validation.failed("episodes.row", &error);

@@ -383,13 +383,17 @@ fn a_difference_names_episodes_calls_and_labels() {
 #[test]
 fn every_refusal_is_documented_and_no_other() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folder = root.join("src/dataset/edit");
-    let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    let text: String = files
-        .chain(["edit.rs", "export.rs"].map(|file| root.join("src/dataset").join(file)))
-        .map(|path| std::fs::read_to_string(path).unwrap())
-        .collect();
-    let is_code = |word: &&str| word.starts_with("edit.") && word[5..].chars().all(|c| c.is_ascii_lowercase());
+    let in_folder = |folder: &str| {
+        let entries = std::fs::read_dir(root.join("src/dataset").join(folder)).unwrap();
+        entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()).collect::<Vec<_>>()
+    };
+    let files = ["edit.rs", "export.rs", "import.rs"].map(|file| root.join("src/dataset").join(file));
+    let files = files.into_iter().chain(in_folder("edit")).chain(in_folder("import"));
+    let text: String = files.map(|path| std::fs::read_to_string(path).unwrap()).collect();
+    let is_code = |word: &&str| {
+        let name = word.strip_prefix("edit.").or_else(|| word.strip_prefix("import."));
+        name.is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase()))
+    };
     let used: BTreeSet<&str> = text.split('"').filter(is_code).collect();
     let page = std::fs::read_to_string(root.join("schemas/findings.md")).unwrap();
     let documented: BTreeSet<&str> = page.split('`').filter(is_code).collect();

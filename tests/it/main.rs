@@ -19,6 +19,8 @@ mod export;
 #[cfg(test)]
 mod fuzz;
 #[cfg(test)]
+mod import;
+#[cfg(test)]
 mod kill;
 #[cfg(test)]
 mod kinematic;

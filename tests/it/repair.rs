@@ -187,6 +187,7 @@ fn a_damaged_recording_keeps_what_lies_before_the_damage_and_the_plan_beside_it(
     let reader = ShardReader::open(&to).unwrap();
     assert_eq!(reader.plan_json(), plan);
     assert_eq!(reader.collect::<Result<Vec<_>, _>>().unwrap(), episodes[..kept]);
+    assert_eq!(run(&["validate", &text(&to)]).0, 0);
     assert_eq!(run(&["repair", &text(&to), "--to", &text(&folder.path().join("again.mcap"))]).0, 0);
     assert_eq!(run(&["repair", &text(&broken), "--to", &text(&to)]).0, 2);
 }

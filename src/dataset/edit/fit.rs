@@ -33,6 +33,10 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }
+    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| feature.dtype == Dtype::Other) {
+        let problem = format!("feature {name:?} is of a type that cannot be carried over");
+        return refused("edit.features", layout::INFO, problem);
+    }
     Ok(())
 }
 

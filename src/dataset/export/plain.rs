@@ -53,7 +53,7 @@ pub(super) fn is_ours(name: &str) -> bool {
 }
 
 /// Writes each file of a folder again, without columns of ours and changed by `change`.
-pub(super) fn copy_files(
+pub(in crate::dataset) fn copy_files(
     root: &Path,
     to: &Path,
     (folder, name): (&str, &str),
@@ -91,7 +91,7 @@ fn without_ours(rows: &RecordBatch) -> Result<RecordBatch, ArrowError> {
 }
 
 /// The rows with further columns.
-pub(super) fn with_columns(
+pub(in crate::dataset) fn with_columns(
     rows: &RecordBatch,
     columns: Vec<(arrow::datatypes::Field, arrow::array::ArrayRef)>,
 ) -> Result<RecordBatch, ArrowError> {

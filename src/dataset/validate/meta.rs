@@ -30,6 +30,13 @@ impl Texts {
         (!is_known).then(|| format!("task_index {task_index} is {text:?}, but the episode's task is {expected:?}"))
     }
 
+    /// What is wrong with a frame's sub-task, when it should have this text, or none.
+    pub(super) fn named_subtask_problem(&self, subtask_index: i64, expected: Option<&str>) -> Option<String> {
+        let text = usize::try_from(subtask_index).ok().map(|index| self.subtasks.get(index).map(String::as_str));
+        let is_right = text.map_or(expected.is_none(), |text| text.is_some() && text == expected);
+        (!is_right).then(|| format!("subtask_index {subtask_index} is {text:?}, but the call is {expected:?}"))
+    }
+
     /// What is wrong with a frame's sub-task.
     pub(super) fn subtask_problem(&self, subtask_index: i64) -> Option<String> {
         let n_subtasks = self.subtasks.len();
@@ -38,8 +45,8 @@ impl Texts {
     }
 }
 
-/// Checks the files below `meta/` and `ntp/info.json`.
-pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
+/// Reads the texts that frames refer to.
+pub(super) fn read_all_texts(root: &Path, validation: &mut Validation) -> Texts {
     let mut texts = Texts::default();
     let mut note = |result: Result<(), DatasetError>| {
         if let Err(error) = result {
@@ -54,6 +61,12 @@ pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
     {
         check_pandas_index(root, file, schema, text, validation);
     }
+    texts
+}
+
+/// Checks the files below `meta/` and `ntp/info.json`.
+pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
+    let mut texts = read_all_texts(root, validation);
     let info = read_json::<Info>(&root.join(layout::INFO));
     // A file of totals that cannot be read is found when the episodes are.
     if let Ok(info) = info {
