@@ -8,6 +8,7 @@ use muxide::api::{Muxer, MuxerBuilder, VideoCodec};
 use re_mp4::{Mp4, StsdBoxContent};
 
 use crate::artifact::{AtomicFile, IoError};
+use crate::table::catch_panic;
 use crate::video::{VideoError, is_key_frame};
 
 /// A file on its way. Its pictures are kept in memory until it is finished.
@@ -103,11 +104,11 @@ impl Mp4Reader {
         let len = file.metadata().map_err(IoError::system("read", path))?.len();
         let reader = BufReader::new(file.try_clone().map_err(IoError::system("open", path))?);
         // The library indexes by numbers that it reads; a damaged file must not end the program.
-        let parsed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Mp4::read(reader, len)));
+        let parsed = catch_panic(|| Mp4::read(reader, len));
         let mp4 = match parsed {
             Ok(Ok(mp4)) => mp4,
             Ok(Err(error)) => return Err(container(path, &error)),
-            Err(_) => return Err(container(path, &"the tables of the video contradict each other")),
+            Err(words) => return Err(container(path, &format!("the video's tables contradict each other: {words}"))),
         };
         let mut tracks = mp4.tracks().values();
         let (Some(track), None) = (tracks.next(), tracks.next()) else {

@@ -21,6 +21,8 @@ const WRIST_RADIUS_M: [f32; 2] = [0.020, 0.028];
 const TUBE_RADIUS_M: f32 = 0.025;
 /// Sides of round parts.
 const N_SIDES: usize = 24;
+/// How far a pad stands out of its finger: sides in one plane would flicker.
+const PAD_PROUD_M: f32 = 0.0005;
 /// Of the soft pad inside of a finger.
 const PAD_HALF_M: [f32; 3] = [0.0075, 0.0006, 0.009];
 
@@ -74,6 +76,6 @@ pub(super) fn finger() -> Mesh {
     let center_z = FINGER_HALF_M[2] - TIP_M;
     mesh.plain_cuboid([0.0, FINGER_HALF_M[1], center_z], FINGER_HALF_M, metal());
     let pad_z = PAD_HALF_M[2] - TIP_M + 0.001;
-    mesh.plain_cuboid([0.0, PAD_HALF_M[1], pad_z], PAD_HALF_M, dark());
+    mesh.plain_cuboid([0.0, PAD_HALF_M[1] - PAD_PROUD_M, pad_z], PAD_HALF_M, dark());
     mesh
 }
