@@ -33,7 +33,9 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }
-    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| feature.dtype == Dtype::Other) {
+    // Files beside the tables and statistics of pictures are not carried over, and must not be lost in silence.
+    let carried = [Dtype::Float32, Dtype::Float64, Dtype::Int64, Dtype::Bool, Dtype::String];
+    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| !carried.contains(&feature.dtype)) {
         let problem = format!("feature {name:?} is of a type that cannot be carried over");
         return refused("edit.features", layout::INFO, problem);
     }
