@@ -39,7 +39,7 @@ fn generate_types() -> Result<(), Box<dyn Error>> {
     prost_build::Config::new()
         .compile_well_known_types()
         // Its comments hold formulas, which would be taken for examples to run.
-        .disable_comments(["foxglove.CameraCalibration"])
+        .disable_comments([".foxglove.CameraCalibration"])
         .include_file("schemas.rs")
         .compile_fds(descriptors)?;
     Ok(())
