@@ -44,6 +44,12 @@ impl Histogram {
         }
     }
 
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.n_pictures += other.n_pictures;
+        let pairs = self.counts.iter_mut().flatten().zip(other.counts.iter().flatten());
+        pairs.for_each(|(count, other)| *count += other);
+    }
+
     pub(super) fn statistics(&self) -> PictureStatistics {
         let channels = |of: &dyn Fn(&[u64; 256]) -> f64| [0, 1, 2].map(|channel| [[of(&self.counts[channel]) / 255.0]]);
         let quantile = |share: f64| channels(&|counts| quantile(counts, share));

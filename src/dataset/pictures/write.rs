@@ -7,13 +7,11 @@ use crate::dataset::config::ConvertConfig;
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::{CameraInfo, FeatureInfo};
-use crate::dataset::pictures::statistics::Histogram;
-use crate::dataset::pictures::video::VideoFiles;
-use crate::dataset::pictures::{PREFIX, PictureStatistics, video_columns};
+use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
 use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
 use crate::table::Values;
-use crate::video::{H264Decoder, Rgb, VideoError, decode_png};
+use crate::video::VideoError;
 
 /// Bytes of pictures that make a row group, at least.
 const GROUP_BYTES: usize = 1 << 25;
@@ -32,8 +30,7 @@ struct PictureFeature {
     camera: String,
     size_px: [u32; 2],
     store: Store,
-    histogram: Histogram,
-    decoded: Rgb,
+    measure: PictureMeasure,
 }
 
 /// Where pictures go.
@@ -56,7 +53,7 @@ impl PictureFeatures {
                 }
             };
             let (camera, size_px) = (pictures.camera.clone(), pictures.size_px);
-            PictureFeature { name, camera, size_px, store, histogram: Histogram::default(), decoded: Rgb::default() }
+            PictureFeature { name, camera, size_px, store, measure: PictureMeasure::new(size_px) }
         };
         Self { features: cameras.iter().map(feature).collect(), fps }
     }
@@ -160,7 +157,7 @@ impl PictureFeatures {
 
     /// Statistics by feature.
     pub(in crate::dataset) fn statistics(&self) -> Vec<(String, PictureStatistics)> {
-        self.features.iter().map(|feature| (feature.name.clone(), feature.histogram.statistics())).collect()
+        self.features.iter().map(|feature| (feature.name.clone(), feature.measure.statistics())).collect()
     }
 
     /// Ends the videos. Returns their files.
@@ -198,24 +195,15 @@ impl PictureFeature {
 
     /// Adds an episode's pictures; each is decoded, for the statistics and so that none is written that is damaged.
     fn append(&mut self, rows: &[&Vec<u8>]) -> Result<(), VideoError> {
-        let expected = self.size_px;
-        let mut decoder = match self.store {
-            Store::Column(_) => None,
-            Store::Videos(_) => Some(H264Decoder::new()?),
-        };
-        for row in rows {
-            match &mut decoder {
-                None => self.decoded = decode_png(row)?,
-                Some(decoder) => decoder.decode(row, &mut self.decoded)?,
-            }
-            if self.decoded.size_px != expected {
-                return Err(VideoError::Size { found: self.decoded.size_px, expected });
-            }
-            self.histogram.add(&self.decoded);
-        }
         match &mut self.store {
-            Store::Column(column) => column.extend(rows.iter().map(|row| (*row).clone())),
-            Store::Videos(videos) => videos.append(rows)?,
+            Store::Column(column) => {
+                rows.iter().try_for_each(|row| self.measure.add_png(row))?;
+                column.extend(rows.iter().map(|row| (*row).clone()));
+            }
+            Store::Videos(videos) => {
+                self.measure.add_video(rows.iter().copied())?;
+                videos.append(rows)?;
+            }
         }
         Ok(())
     }
