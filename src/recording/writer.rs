@@ -403,5 +403,6 @@ fn encode_end(episode: &Episode) -> proto::EpisodeEnd {
         frames: episode.frames.len() as u32,
         boundary_frames: episode.boundary_frames().count() as u32,
         calls: episode.calls.len() as u32,
+        pushes: 0,
     }
 }

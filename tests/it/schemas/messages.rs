@@ -148,7 +148,7 @@ fn field_numbers_are_those_of_the_first_version() {
         })
         .collect();
     let expected = [
-        "EpisodeEnd: index=1 success=2 cause=3 frames=4 boundary_frames=5 calls=6",
+        "EpisodeEnd: index=1 success=2 cause=3 frames=4 boundary_frames=5 calls=6 pushes=7",
         "EpisodeStart: index=1 family=2 task_id=3 task_text=4 split=5 trial=6 seed=7 counts=8 policy=9 scene=10 \
          specification_frames=11",
         "Observation: frame=1 boundary=2 opening_m=3 held=4 slots=5 slot_positions_m=6",
