@@ -10,6 +10,7 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! world/adversary, adversary        pushes of an adversary, where there are any: an arrow and a lane
 //! camera/{front, wrist}             what cameras see
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
@@ -35,6 +36,7 @@ mod gripper;
 mod lanes;
 mod palette;
 mod pictures;
+mod pushes;
 mod rrd;
 mod series;
 mod specification;
@@ -229,6 +231,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
+    pushes::put(&mut store, episode)?;
     pictures::put(&mut store, episode)?;
     calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;
