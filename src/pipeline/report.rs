@@ -16,7 +16,7 @@ use crate::training::METRICS_FILE;
 /// What a report holds.
 const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
 /// Version of what a report says, beside that of the program.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let mut inputs = BTreeMap::new();

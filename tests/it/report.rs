@@ -333,14 +333,23 @@ fn the_markdown_says_what_made_the_figures() {
     insta::assert_snapshot!(run.text("report.md"), @"
     **Ten <rollouts>**: ntp 0.1.0, commit 0123456789, training seeds 0, 1.5 CPU-minutes.
 
-    | suite           | model | tasks | decoder | seeds | rollouts | success | 95 %           | paper |
-    | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | -------------- | ----: |
-    | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978] | 0.863 |
-    | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658] |     - |
+    | suite           | model | tasks | decoder | seeds | rollouts | success | 95 % over rollouts | lowest, highest seed | 95 % over seeds | paper |
+    | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | ------------------ | -------------------- | --------------- | ----: |
+    | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978]     | 0.800, 1.000         | [0.000, 1.000]  | 0.863 |
+    | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658]     | -                    | -               |     - |
 
     | the paper's claim                                 | encoder        | here       | figures                                                                         |
     | ------------------------------------------------- | -------------- | ---------- | ------------------------------------------------------------------------------- |
     | NTP stacks unseen configurations better than Flat | object-centric | reproduced | ntp 0.900 (stacking_unseen, 100 tasks), flat 0.000 (stacking_unseen, 100 tasks) |
+
+    | suite           | model | tasks | decoder | failed | as judged                     | first error: program and kind                         |
+    | --------------- | ----- | ----: | ------- | -----: | ----------------------------- | ----------------------------------------------------- |
+    | stacking_unseen | ntp   |   100 | mss     |      1 | ended early 1                 | pick and place: scope 1                               |
+    | stacking_unseen | flat  |   100 | mss     |      2 | missed grasp 1, never ended 1 | block stacking: argument 1, block stacking: program 1 |
+
+    | experiment | model | tasks | seeds | parameters | CPU-seconds a training |
+    | ---------- | ----- | ----: | ----: | ---------: | ---------------------: |
+    | ten        | ntp   |   100 |     1 |     25 123 |                     90 |
     ");
 }
 
