@@ -10,6 +10,7 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! world/adversary, adversary        pushes of an adversary, where there are any: an arrow and a lane
 //! camera/{front, wrist}             what cameras see
 //! filmed/<camera>                   what the recording's own cameras saw, the first of them what a policy that sees saw
 //! programs/depth_<n>                the stack of running programs, a lane a depth
@@ -41,6 +42,7 @@ mod layout;
 mod palette;
 mod pictures;
 mod playback;
+mod pushes;
 mod rrd;
 mod series;
 mod specification;
@@ -266,6 +268,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
+    pushes::put(&mut store, episode)?;
     pictures::put(&mut store, replay)?;
     calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;

@@ -14,7 +14,7 @@ use parquet::file::metadata::ParquetMetaData;
 use crate::artifact::IoError;
 use crate::table::arrays::append_array;
 use crate::table::guard::guarded;
-use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema, Value};
+use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
 
 /// Rows of one batch.
 const BATCH_ROWS: usize = 8192;

@@ -16,10 +16,10 @@ use re_lerobot::datasetv3::LeRobotDatasetV3;
 use crate::dataset::{densify, episodes};
 
 /// The feature of each camera, and how far a value may be off on average.
-const CAMERAS: [(&str, PictureFormat, f64); 2] =
+pub(crate) const CAMERAS: [(&str, PictureFormat, f64); 2] =
     [("front", PictureFormat::Png, 0.0), ("wrist", PictureFormat::H264, 8.0)];
 
-fn cameras() -> Vec<CameraConfig> {
+pub(crate) fn cameras() -> Vec<CameraConfig> {
     let of = |(name, format, _): (&str, PictureFormat, f64)| {
         let view = if name == "front" { Viewpoint::Front } else { Viewpoint::Wrist };
         CameraConfig { format, ..CameraConfig::new(view, [64, 48]) }

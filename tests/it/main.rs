@@ -13,11 +13,15 @@ mod dataset;
 #[cfg(test)]
 mod dataset_edit;
 #[cfg(test)]
+mod dataset_loading;
+#[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;
+#[cfg(test)]
+mod forward;
 #[cfg(test)]
 mod fuzz;
 #[cfg(test)]
