@@ -257,3 +257,30 @@ fn a_camera_in_the_middle_of_things_draws_without_fault() {
         }
     }
 }
+
+#[test]
+fn blocks_that_stand_aside_are_in_no_usual_picture() {
+    let scene = scene(Family::BlockStacking, &[1, 1, 0, 0, 0, 0, 0, 0]);
+    let reach = Randomization { camera_m: 0.03, camera_rad: 0.05, ..Randomization::default() };
+    let [front, wrist] = [Camera::front(Family::BlockStacking, [64, 64]), Camera::wrist([64, 64])];
+    let mut renderer = Renderer::new(Look::plain());
+    let mut check = |state: &SceneState, camera: &Camera, seen: &[u16]| {
+        let segments = &renderer.draw(&scene, state, camera).segments;
+        for body in scene.body_indices() {
+            let is_seen = segments.contains(&Segment::Body(body).number());
+            assert!(!is_seen || seen.contains(&body.0), "{}", scene.body(body).name);
+        }
+    };
+    for seed in 0..100 {
+        let state = initial_state(Family::BlockStacking, &scene, Seed(seed));
+        for camera in [front, wrist, reach.camera(&front, Seed(seed))] {
+            check(&state, &camera, &[0, 1]);
+        }
+        for above in [0, 1] {
+            let mut over = state.clone();
+            over.gripper_in_world.translation.vector = state.bodies_in_world[above].translation.vector;
+            over.gripper_in_world.translation.vector.z += 0.3;
+            check(&over, &wrist, &[0, 1]);
+        }
+    }
+}
