@@ -14,6 +14,7 @@
 //! The same columns give the same bytes: Snappy, a fixed `created_by`, no clock. `ARROW:schema` is kept in the file,
 //! so that readers tell lists of fixed size from others.
 
+mod arrays;
 mod batches;
 mod column;
 mod encode;
@@ -26,8 +27,8 @@ mod schema;
 mod values;
 mod write;
 
+pub(crate) use arrays::{FloatRows, TextRows};
 pub(crate) use batches::{BatchReader, BatchWriter};
-pub(crate) use column::FloatRows;
 pub use column::{Column, Columns};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;

@@ -24,6 +24,9 @@
 //!
 //! Timelines are `sim_time` (the episode's own clock) and `frame` (position among its recorded frames).
 //!
+//! An episode of a dataset (a [`Playback`]) has `programs`, `calls` and `episode` as well, `camera/<name>` for each of
+//! the dataset's cameras, and `numbers/<feature>/<dimension>`; its timelines are `timestamp` and `frame`.
+//!
 //! # Invariants
 //!
 //! The same replays give the same bytes: ids come from content, never from a clock.
@@ -34,8 +37,10 @@ mod calls;
 mod clock;
 mod gripper;
 mod lanes;
+mod layout;
 mod palette;
 mod pictures;
+mod playback;
 mod rrd;
 mod series;
 mod specification;
@@ -49,7 +54,11 @@ use std::path::{Path, PathBuf};
 use rerun::log::ChunkError;
 
 use crate::artifact::IoError;
+<<<<<<< HEAD
 use crate::render::CameraConfig;
+=======
+use crate::dataset::Playback;
+>>>>>>> h5
 use crate::rollout::Divergence;
 use crate::trace::{Actor, Episode};
 use crate::video::VideoError;
@@ -190,6 +199,33 @@ pub fn spawn(episodes: &[Episode]) -> Result<VisualizeSummary, VisualizeError> {
 pub fn spawn_replays(replays: &[Replay<'_>]) -> Result<VisualizeSummary, VisualizeError> {
     let viewer = viewer::connect()?;
     let summary = each_store(replays, |store| {
+        viewer.send(store);
+        Ok(())
+    })?;
+    viewer.flush()?;
+    Ok(summary)
+}
+
+/// Writes episodes of datasets into an `.rrd` file, one recording each. The file is whole or not there.
+///
+/// # Errors
+///
+/// See [`VisualizeError`].
+pub fn save_playbacks(playbacks: &[Playback], path: &Path) -> Result<VisualizeSummary, VisualizeError> {
+    let mut file = RrdFile::create(path)?;
+    let summary = playback::each_store(playbacks, |store| file.append(store))?;
+    let bytes = file.finish()?;
+    Ok(VisualizeSummary { bytes, ..summary })
+}
+
+/// Shows episodes of datasets in the Rerun viewer.
+///
+/// # Errors
+///
+/// As [`spawn()`].
+pub fn spawn_playbacks(playbacks: &[Playback]) -> Result<VisualizeSummary, VisualizeError> {
+    let viewer = viewer::connect()?;
+    let summary = playback::each_store(playbacks, |store| {
         viewer.send(store);
         Ok(())
     })?;

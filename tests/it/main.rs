@@ -6,6 +6,8 @@ mod architecture;
 mod artifact;
 #[cfg(test)]
 mod cli;
+#[cfg(all(test, feature = "cloud"))]
+mod cloud;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
@@ -40,6 +42,8 @@ mod pipeline;
 mod pipeline_pictures;
 #[cfg(test)]
 mod pipeline_suites;
+#[cfg(test)]
+mod playback;
 #[cfg(test)]
 mod publish;
 #[cfg(test)]

@@ -121,15 +121,20 @@ fn read_back(replays: &[Replay<'_>]) -> Read {
     let summary = save_replays(replays, &path).unwrap();
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
     assert_eq!(summary.episodes, replays.len());
-    let mut read = Read { recordings: BTreeMap::new(), _folder: folder, path };
-    for message in decode(&read.path) {
+    Read { recordings: recordings(&path), _folder: folder, path }
+}
+
+/// The chunks of each recording in a file, blueprints left out.
+pub(crate) fn recordings(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
+    let mut recordings: BTreeMap<String, Vec<Chunk>> = BTreeMap::new();
+    for message in decode(path) {
         let LogMsg::ArrowMsg(store, message) = message else { continue };
         let chunk = Chunk::from_arrow_msg(&message).unwrap();
         if store.kind() == StoreKind::Recording {
-            read.recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
+            recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
         }
     }
-    read
+    recordings
 }
 
 impl Read {
@@ -139,11 +144,11 @@ impl Read {
     }
 }
 
-fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
+pub(crate) fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
     chunks.iter().map(|chunk| chunk.entity_path().to_string()).collect()
 }
 
-fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
+pub(crate) fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
     let found: Vec<&Chunk> =
         chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity && !chunk.is_static()).collect();
     assert_eq!(found.len(), 1, "{entity}");
@@ -155,7 +160,7 @@ fn times(chunk: &Chunk, timeline: &'static str) -> Vec<i64> {
 }
 
 /// Frames and labels of a lane.
-fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
+pub(crate) fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
     let chunk = temporal(chunks, entity);
     let component = rerun::StateChange::descriptor_state().component;
     let labels = chunk.iter_slices::<String>(component);

@@ -94,8 +94,13 @@ impl Histogram {
 
     pub(super) fn merge(&mut self, other: &Self) {
         self.n_pictures += other.n_pictures;
+<<<<<<< HEAD
         let counts = self.counts.as_flattened_mut().iter_mut().zip(other.counts.as_flattened());
         counts.for_each(|(sum, count)| *sum += count);
+=======
+        let pairs = self.counts.iter_mut().flatten().zip(other.counts.iter().flatten());
+        pairs.for_each(|(count, other)| *count += other);
+>>>>>>> h5
     }
 
     pub(super) fn statistics(&self) -> PictureStatistics {

@@ -7,6 +7,7 @@ use crate::dataset::config::ConvertConfig;
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::{CameraInfo, FeatureInfo};
+<<<<<<< HEAD
 use crate::dataset::pictures::statistics::{EpisodeStatistics, Histogram};
 use crate::dataset::pictures::video::VideoFiles;
 use crate::dataset::pictures::{PREFIX, PictureStatistics, video_columns};
@@ -14,6 +15,13 @@ use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
 use crate::table::{ColumnKind, Value, Values};
 use crate::video::{H264Decoder, Rgb, VideoError, decode_png};
+=======
+use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
+use crate::recording::CameraPictures;
+use crate::render::PictureFormat;
+use crate::table::Values;
+use crate::video::VideoError;
+>>>>>>> h5
 
 /// Bytes of pictures that make a row group, at least.
 const GROUP_BYTES: usize = 1 << 25;
@@ -32,9 +40,13 @@ struct PictureFeature {
     camera: String,
     size_px: [u32; 2],
     store: Store,
+<<<<<<< HEAD
     episodes: EpisodeStatistics,
     histogram: Histogram,
     decoded: Rgb,
+=======
+    measure: PictureMeasure,
+>>>>>>> h5
 }
 
 /// Where pictures go.
@@ -57,9 +69,13 @@ impl PictureFeatures {
                 }
             };
             let (camera, size_px) = (pictures.camera.clone(), pictures.size_px);
+<<<<<<< HEAD
             let (episodes, histogram, decoded) =
                 (EpisodeStatistics::new(&name), Histogram::default(), Rgb::default());
             PictureFeature { name, camera, size_px, store, episodes, histogram, decoded }
+=======
+            PictureFeature { name, camera, size_px, store, measure: PictureMeasure::new(size_px) }
+>>>>>>> h5
         };
         Self { features: cameras.iter().map(feature).collect(), fps }
     }
@@ -170,7 +186,7 @@ impl PictureFeatures {
 
     /// Statistics by feature.
     pub(in crate::dataset) fn statistics(&self) -> Vec<(String, PictureStatistics)> {
-        self.features.iter().map(|feature| (feature.name.clone(), feature.histogram.statistics())).collect()
+        self.features.iter().map(|feature| (feature.name.clone(), feature.measure.statistics())).collect()
     }
 
     /// Ends the videos. Returns their files.
@@ -208,6 +224,7 @@ impl PictureFeature {
 
     /// Adds an episode's pictures; each is decoded, for the statistics and so that none is written that is damaged.
     fn append(&mut self, rows: &[&Vec<u8>]) -> Result<(), VideoError> {
+<<<<<<< HEAD
         let (expected, mut episode) = (self.size_px, Histogram::default());
         let mut decoder = match self.store {
             Store::Column(_) => None,
@@ -225,9 +242,17 @@ impl PictureFeature {
         }
         self.histogram.merge(&episode);
         self.episodes.append(&episode);
+=======
+>>>>>>> h5
         match &mut self.store {
-            Store::Column(column) => column.extend(rows.iter().map(|row| (*row).clone())),
-            Store::Videos(videos) => videos.append(rows)?,
+            Store::Column(column) => {
+                rows.iter().try_for_each(|row| self.measure.add_png(row))?;
+                column.extend(rows.iter().map(|row| (*row).clone()));
+            }
+            Store::Videos(videos) => {
+                self.measure.add_video(rows.iter().copied())?;
+                videos.append(rows)?;
+            }
         }
         Ok(())
     }
