@@ -14,8 +14,9 @@ use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
 use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
+use crate::scene::BodyIndex;
 use crate::task::TaskSet;
-use crate::trace::{Actor, Episode};
+use crate::trace::{Actor, Episode, Push};
 use crate::visualize::{self, Replay};
 
 /// An episode, with what is to be shown beside it.
@@ -123,6 +124,10 @@ impl Found {
         if let (Some(divergence), Some((frame, secs))) = (divergence, self.divergent_frame()) {
             words.push_str(&format!("; leaves the expert at {secs:.1} s, frame {frame}: {divergence}"));
         }
+        if !episode.pushes.is_empty() {
+            let times = episode.pushes.iter().map(|push| format!("{:.1} s", secs_of(episode, push.frames.begin)));
+            words.push_str(&format!("; the adversary pushes at {}", times.collect::<Vec<_>>().join(", ")));
+        }
         words
     }
 
@@ -138,8 +143,25 @@ impl Found {
             "calls": self.episode.calls.len(),
             "demonstration": self.demonstration.is_some(),
             "first_divergence": divergence,
+            "pushes": self.episode.pushes.iter().map(|push| push_to_json(&self.episode, push)).collect::<Vec<_>>(),
         })
     }
+}
+
+fn push_to_json(episode: &Episode, push: &Push) -> Value {
+    let name = |body: &BodyIndex| episode.scene.body(*body).name.as_str();
+    json!({
+        "frame": push.frames.begin,
+        "secs": secs_of(episode, push.frames.begin),
+        "body": name(&push.body),
+        "impulse_ns": push.impulse_ns,
+        "toppled": push.toppled.iter().map(name).collect::<Vec<_>>(),
+    })
+}
+
+/// The time of a frame since the episode began, in seconds.
+fn secs_of(episode: &Episode, frame: u32) -> f64 {
+    episode.frames.get(frame as usize).map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
 }
 
 /// The recording that an episode is in, and the episode; counted as [`find`] does.

@@ -80,13 +80,22 @@ fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
 fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
     let experiment = &context.pipeline.spec.name;
     let rollouts = rollout::units(context)?;
-    let paths = rollouts.iter().map(|unit| unit.dir.path().join(rollout::TABLE));
-    inputs.rollouts.extend(paths.map(|path| RolloutsInput { experiment: experiment.clone(), path }));
+    inputs.rollouts.extend(rollouts.iter().map(|unit| RolloutsInput {
+        experiment: experiment.clone(),
+        tag: tag_of(context, unit),
+        path: unit.dir.path().join(rollout::TABLE),
+    }));
     let costs = Costs::read(context.dir)?;
     inputs.metrics.extend(trainings(context, &costs)?);
     inputs.facts.extend(facts(context)?);
     inputs.costs.extend(stage_costs(context, &costs, &mut inputs.commits)?);
     Ok(())
+}
+
+/// The tag of the model that acts in a unit of the rollout stage.
+fn tag_of(context: &Context<'_>, unit: &Unit) -> Option<String> {
+    let Part::Suite { actor: Some(actor), .. } = unit.part else { return None };
+    context.pipeline.spec.models[actor.model].tag.clone()
 }
 
 fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
@@ -99,6 +108,7 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         let model = ModelSummary {
             experiment: context.pipeline.spec.name.clone(),
             variant: spec.variant.name().to_owned(),
+            tag: spec.tag.clone(),
             train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
             specification: spec.specification().name().to_owned(),
             seed: seed as i64,

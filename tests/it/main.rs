@@ -19,6 +19,8 @@ mod expert;
 #[cfg(test)]
 mod export;
 #[cfg(test)]
+mod forward;
+#[cfg(test)]
 mod fuzz;
 #[cfg(test)]
 mod import;
