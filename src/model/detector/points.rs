@@ -65,7 +65,7 @@ impl Detector for PointDetector {
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let seen = self.perception.look(pictures) * 3.0; // [F, K, PERCEPT_WIDTH]
+        let seen = self.perception.look(pictures).0 * 3.0; // [F, K, PERCEPT_WIDTH]
         let [n_pictures, n_percepts, width] = seen.dims();
         let all = [n_pictures, n_percepts, n_percepts, width];
         let own: Tensor<4> = seen.clone().unsqueeze_dim::<4>(2).expand(all);
