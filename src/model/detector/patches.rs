@@ -1,0 +1,116 @@
+//! What surrounds a thing in a picture: a square of pixels about it, told by whose they are.
+//!
+//! # Shapes
+//!
+//! A patch is `side * side` cells of [`CHANNELS`] numbers, row by row: how much of the pixel is of the thing itself, of
+//! another thing, of the robot, and how much brighter it is than the background. Beyond the picture all are zero.
+//!
+//! # Invariants
+//!
+//! Places and colours are data here: no gradient passes through a patch.
+
+use crate::model::colour_slots::Claims;
+use crate::model::pictures::Pictures;
+
+/// Numbers of a cell.
+pub(super) const CHANNELS: usize = 4;
+/// Most of a patch is background, where all numbers are zero; the others are scaled so that a few of them tell.
+const GAIN: f32 = 3.0;
+
+/// Pictures whose pixels are claimed by colour slots, the robot's first.
+pub(super) struct Claimed<'p> {
+    pub(super) pictures: &'p Pictures,
+    pub(super) claims: &'p Claims,
+    /// How many of the slots, from the second on, are things; what is behind them is letters and shadows.
+    pub(super) n_things: usize,
+}
+
+impl Claimed<'_> {
+    /// The patches of some slots in each picture, about the places where they are seen.
+    ///
+    /// # Shapes
+    ///
+    /// `centres` is `[F, K, width]` and begins with x and y; the result is `[F, slots, side * side * CHANNELS]`.
+    pub(super) fn patches(
+        &self,
+        centres: &[f32],
+        width: usize,
+        slots: std::ops::Range<usize>,
+        side: usize,
+    ) -> Vec<f32> {
+        let n_slots = self.claims.n_slots;
+        let n_cells = side * side * CHANNELS;
+        let mut patches = vec![0.0; self.pictures.n * slots.len() * n_cells];
+        let of_picture = patches.chunks_exact_mut((slots.len() * n_cells).max(1));
+        for (picture, patches) in of_picture.enumerate() {
+            let centres = &centres[picture * n_slots * width..][..n_slots * width];
+            for (slot, patch) in slots.clone().zip(patches.chunks_exact_mut(n_cells)) {
+                let corner = self.corner([centres[slot * width], centres[slot * width + 1]], side);
+                self.brightness(picture, corner, side, patch);
+                self.claims(picture, slot, corner, side, patch);
+            }
+        }
+        patches
+    }
+
+    /// Column and row of a patch's upper left cell.
+    fn corner(&self, [x, y]: [f32; 2], side: usize) -> [i64; 2] {
+        let pixel = |place: f32, size: usize| ((place + 1.0) / 2.0 * size as f32).floor() as i64 - side as i64 / 2;
+        [pixel(x, self.pictures.width), pixel(y, self.pictures.height)]
+    }
+
+    fn brightness(&self, picture: usize, corner: [i64; 2], side: usize, patch: &mut [f32]) {
+        let Pictures { width, height, .. } = *self.pictures;
+        let of_picture = &self.claims.brightness[picture * width * height..][..width * height];
+        for (cell, values) in patch.chunks_exact_mut(CHANNELS).enumerate() {
+            let [column, row] = [corner[0] + (cell % side) as i64, corner[1] + (cell / side) as i64];
+            if (0..width as i64).contains(&column) && (0..height as i64).contains(&row) {
+                values[3] = GAIN * of_picture[row as usize * width + column as usize];
+            }
+        }
+    }
+
+    fn claims(&self, picture: usize, slot: usize, corner: [i64; 2], side: usize, patch: &mut [f32]) {
+        for point in &self.claims.points[picture] {
+            let [x, y] = [point.column as i64 - corner[0], point.row as i64 - corner[1]];
+            if !(0..side as i64).contains(&x) || !(0..side as i64).contains(&y) {
+                continue;
+            }
+            let values = &mut patch[(y as usize * side + x as usize) * CHANNELS..][..CHANNELS];
+            let shares = self.claims.shares(point);
+            let things: f32 = shares[1..=self.n_things].iter().sum();
+            values[0] = GAIN * shares[slot];
+            values[1] = GAIN * if slot == 0 { things } else { things - shares[slot] };
+            values[2] = if slot == 0 { 0.0 } else { GAIN * shares[0] };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CHANNELS, Claimed, GAIN};
+    use crate::model::colour_slots::Claims;
+    use crate::model::pictures::Pictures;
+
+    #[test]
+    fn a_patch_tells_whose_the_pixels_about_a_place_are() {
+        let mut pictures = Pictures::of_size(4, 4);
+        pictures.push(&[0; 48]);
+        // The second of two things at (2, 1), the robot at (3, 1), half the first thing's at (2, 2).
+        let claims = Claims::made(3, vec![(2, 1, [0.0, 0.0, 1.0]), (3, 1, [1.0, 0.0, 0.0]), (2, 2, [0.0, 0.5, 0.5])]);
+        let claimed = Claimed { pictures: &pictures, claims: &claims, n_things: 2 };
+        // The robot and the first thing lie in the middle of the picture, the second at its right end.
+        let centres = [0.0, 0.0, 0.0, 0.0, 0.9, 0.0];
+        let patches = claimed.patches(&centres, 2, 1..3, 2);
+        let (first, second) = patches.split_at(4 * CHANNELS);
+        let bright = GAIN * 0.2;
+        assert_eq!(first[..4], [0.0, 0.0, 0.0, bright]);
+        assert_eq!(first[4..8], [0.0, GAIN, 0.0, bright]);
+        assert_eq!(first[12..], [0.5 * GAIN, 0.5 * GAIN, 0.0, bright]);
+        assert_eq!(second[..4], [GAIN, 0.0, 0.0, bright]);
+        assert_eq!(second[4..8], [0.0, 0.0, GAIN, bright]);
+        // Of the robot all things are one.
+        let robot = claimed.patches(&centres, 2, 0..1, 2);
+        assert_eq!(robot[4..8], [0.0, GAIN, 0.0, bright]);
+    }
+}
