@@ -8,15 +8,17 @@ use crate::artifact::{FileEntry, IoError, Plan, Receipt};
 use crate::model;
 use crate::pipeline::costs::Costs;
 use crate::pipeline::runner::{Context, Options, Part, Unit};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout, tasks, train};
-use crate::report::{self, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train};
+use crate::report::{
+    self, DetectionsInput, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values,
+};
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
 /// What a report holds.
 const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
 /// Version of what a report says, beside that of the program.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let mut inputs = BTreeMap::new();
@@ -81,6 +83,12 @@ fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), Pipeli
     let rollouts = rollout::units(context)?;
     let paths = rollouts.iter().map(|unit| unit.dir.path().join(rollout::TABLE));
     inputs.rollouts.extend(paths.map(|path| RolloutsInput { experiment: experiment.clone(), path }));
+    for unit in &rollouts {
+        if unit.dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
+            let path = unit.dir.path().join(detections::TABLE);
+            inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
+        }
+    }
     let costs = Costs::read(context.dir)?;
     inputs.metrics.extend(trainings(context, &costs)?);
     inputs.facts.extend(facts(context)?);

@@ -3,6 +3,7 @@
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
 use crate::report::claims::{Claim, Verdict};
+use crate::report::detections::DetectionError;
 use crate::report::summary::{Aggregate, Report};
 
 /// The columns, and whether numbers stand in them.
@@ -25,11 +26,48 @@ pub(super) fn render(report: &Report) -> String {
         text.push('\n');
         text.push_str(&table(&COLUMNS, report.aggregates.iter().map(row).collect()));
     }
+    if !report.detections.is_empty() {
+        text.push_str("\nErrors of detectors in the demonstrations that they were shown, in centimetres, by how much of a block is in sight:\n\n");
+        text.push_str(&table(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect()));
+    }
     if !report.claims.is_empty() {
         text.push('\n');
         text.push_str(&table(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect()));
     }
     text
+}
+
+const DETECTION_COLUMNS: [(&str, bool); 12] = [
+    ("suite", false),
+    ("model", false),
+    ("tasks", true),
+    ("seeds", true),
+    ("in sight", false),
+    ("detections", true),
+    ("median", true),
+    ("mean absolute x, y, z", true),
+    ("deviation", true),
+    ("95 %, 99 %", true),
+    ("over 2 cm", true),
+    ("paper's deviation", true),
+];
+
+fn detection(error: &DetectionError) -> Vec<String> {
+    let [x, y, z] = error.mean_absolute_cm;
+    vec![
+        error.suite.clone(),
+        error.variant.clone(),
+        error.train_tasks.to_string(),
+        error.seeds.to_string(),
+        error.in_sight.words().to_owned(),
+        error.detections.to_string(),
+        format!("{:.2}", error.median_cm),
+        format!("{x:.2}, {y:.2}, {z:.2}"),
+        format!("{:.2}", error.deviation_cm),
+        format!("{:.2}, {:.2}", error.percentile_95_cm, error.percentile_99_cm),
+        format!("{:.2} %", 100.0 * error.over_2_cm),
+        format!("{:.0}", error.paper_deviation_cm),
+    ]
 }
 
 const CLAIM_COLUMNS: [(&str, bool); 4] =

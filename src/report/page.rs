@@ -16,7 +16,7 @@ use crate::report::claims::{Claim, Verdict};
 use crate::report::metrics::{self, Curve};
 use crate::report::order::{self, DECODERS};
 use crate::report::summary::{Actor, Aggregate, Fact, Report, SuiteResult};
-use crate::report::tables::{self, AdversaryRow, CostRow, HeatGrid, ModelRow};
+use crate::report::tables::{self, AdversaryRow, CostRow, DetectionRow, HeatGrid, ModelRow};
 
 /// Most headline figures.
 const N_TILES: usize = 4;
@@ -45,6 +45,7 @@ struct Page<'a> {
     has_paper_encoder: bool,
     adversary: Vec<AdversaryRow>,
     heat: Vec<HeatGrid>,
+    detections: Vec<DetectionRow>,
     models: Vec<ModelRow>,
     cost_stages: Vec<String>,
     costs: Vec<CostRow>,
@@ -149,6 +150,7 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
         has_paper_encoder: in_figures().any(|variant| has_paper_encoder(variant)),
         adversary: tables::adversary(&report.figures),
         heat: tables::heat(&report.grids),
+        detections: tables::detections(&report.detections),
         models: tables::models(&report.models),
         cost_stages,
         costs,

@@ -13,6 +13,8 @@ mod dataset_edit;
 #[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
+mod detecting;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;

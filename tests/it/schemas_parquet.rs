@@ -7,8 +7,7 @@ use ntp::dataset::schema;
 use ntp::table::{ColumnKind, Form, TableSchema, Value};
 
 fn schemas() -> Vec<TableSchema> {
-    let others =
-        [TableSchema::ROLLOUTS, TableSchema::METRICS, TableSchema::DETECTOR_METRICS, TableSchema::DETECTIONS];
+    let others = [TableSchema::ROLLOUTS, TableSchema::METRICS, TableSchema::DETECTOR_METRICS, TableSchema::DETECTIONS];
     schema::ALL.into_iter().chain(others).collect()
 }
 
