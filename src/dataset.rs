@@ -61,7 +61,7 @@ pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use lookup::{CallFacts, EpisodeFacts, FrameFacts, look_up};
-pub use pictures::EpisodePictures;
+pub use pictures::{Decoded, EpisodePictures, EpisodeRows, PictureLoader};
 pub use read::read_trials;
 pub use summary::{DatasetSummary, summarize};
 pub use table_files::table_files;

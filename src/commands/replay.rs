@@ -10,6 +10,7 @@ use crate::cli::ReplayArgs;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
+use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
 use crate::task::TaskSet;
 use crate::trace::{Actor, Episode};
@@ -23,6 +24,7 @@ struct Found {
     episode: Episode,
     demonstration: Option<Episode>,
     divergence: Option<Divergence>,
+    cameras: Vec<CameraConfig>,
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
@@ -65,8 +67,8 @@ fn verify(args: &ReplayArgs, found: &[Found]) -> anyhow::Result<CommandOutcome> 
 
 impl Found {
     fn replay(&self) -> Replay<'_> {
-        let Self { episode, demonstration, divergence, .. } = self;
-        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence }
+        let Self { episode, demonstration, divergence, cameras, .. } = self;
+        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence, cameras }
     }
 
     /// The frame at which a policy first left the expert's decisions, and its time.
@@ -124,10 +126,11 @@ fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
             if !(n_episodes..n_episodes + reader.n_episodes()).contains(&number) {
                 continue;
             }
-            let plan = serde_json::from_str(reader.plan_json())
+            let plan: Plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
-            let episode = reader.read_episode(number - n_episodes)?;
-            found.push(Found { number, file: file.clone(), plan, episode, demonstration: None, divergence: None });
+            let (episode, cameras) = (reader.read_episode(number - n_episodes)?, pipeline::cameras_of(&plan));
+            let (file, demonstration, divergence) = (file.clone(), None, None);
+            found.push(Found { number, file, plan, episode, demonstration, divergence, cameras });
         }
         n_episodes += reader.n_episodes();
     }

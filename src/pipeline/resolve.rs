@@ -8,7 +8,6 @@ use crate::artifact;
 use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
-use crate::render::PictureFormat;
 use crate::task::{Family, Split};
 
 /// So many tasks are held out at most when the pipeline file says nothing.
@@ -188,9 +187,6 @@ impl Pipeline {
     fn blindness(&self) -> Option<&'static str> {
         match self.spec.generate.cameras.first() {
             None => Some("it sees with the first of generate.cameras, and there is none"),
-            Some(camera) if camera.format != PictureFormat::Png => {
-                Some("the first of generate.cameras must have format png")
-            }
             Some(camera) if camera.size_px[0] != camera.size_px[1] => {
                 Some("the first of generate.cameras must be as wide as high")
             }

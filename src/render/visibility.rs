@@ -1,7 +1,7 @@
 //! How much of each body a camera sees.
 
 use crate::render::camera::Camera;
-use crate::render::look::{Look, Shadows};
+use crate::render::look::{Letters, Look, Shadows};
 use crate::render::picture::Segment;
 use crate::render::renderer::Renderer;
 use crate::scene::{BodyIndex, Scene, SceneState};
@@ -18,7 +18,7 @@ pub struct Visibility {
 
 impl Default for Visibility {
     fn default() -> Self {
-        Self { renderer: Renderer::new(Look { shadows: Shadows::None, letters: false, ..Look::plain() }) }
+        Self { renderer: Renderer::new(Look { shadows: Shadows::None, letters: Letters::None, ..Look::plain() }) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
-use crate::report::claims::{Claim, Verdict};
+use crate::report::claims::{Claim, Note, Verdict};
 use crate::report::detections::DetectionError;
 use crate::report::summary::{Aggregate, Report};
 
@@ -33,6 +33,10 @@ pub(super) fn render(report: &Report) -> String {
     if !report.claims.is_empty() {
         text.push('\n');
         text.push_str(&table(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect()));
+    }
+    if !report.notes.is_empty() {
+        text.push('\n');
+        report.notes.iter().for_each(|said| text.push_str(&note(said)));
     }
     text
 }
@@ -79,6 +83,13 @@ fn claim(claim: &Claim) -> Vec<String> {
         _ => format!("**{}**", claim.verdict.words()),
     };
     vec![claim.claim.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
+}
+
+fn note(note: &Note) -> String {
+    match note.variant.as_str() {
+        "" => format!("- {}\n", note.text),
+        variant => format!("- `{variant}`: {}\n", note.text),
+    }
 }
 
 /// What made the figures: program, commit, seeds, cost.

@@ -82,6 +82,10 @@ impl DetectorRun<'_> {
         detector: D,
         hooks: &mut Hooks<'_>,
     ) -> Result<(D, DetectorStanding), TrainError> {
+        if let Some(empty) = self.data.trials.iter().find(|trial| trial.n_frames == 0) {
+            let (task, problem) = (empty.task_id.clone(), "has no frames".to_owned());
+            return Err(TrainError::Trial { task, trial: empty.trial, problem });
+        }
         let checkpoints = Checkpoints::of_detector(self.folder, self.model, dataset_hash(self.data));
         let device = detector.device();
         let fresh = Learner::new(detector, device, self.config.clip_norm);
@@ -125,11 +129,15 @@ impl DetectorRun<'_> {
         learner: Learner<D>,
         standing: &mut DetectorStanding,
     ) -> Result<(Learner<D>, f32), TrainError> {
-        let seed = self.seed.derive("detector_step", &[u64::from(standing.step)]);
-        let groups: Vec<Shown> = (0..GROUPS)
+        let groups: Vec<Shown> = self
+            .draw(standing.step)
             .into_par_iter()
-            .map(|group| self.draw(seed.derive("group", &[group as u64])))
+            .map(|drawn| self.show(&drawn))
             .collect::<Result<_, TrainError>>()?;
+        if standing.step + 1 < self.config.detector.n_steps() {
+            let next = self.draw(standing.step + 1).into_iter().flatten().map(|(trial, _)| trial);
+            self.gallery.announce(&next.collect::<Vec<_>>());
+        }
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
         let (n_slots, weight) = (self.data.n_slots, 1.0 / GROUPS as f32);
         let (learner, losses) = learner.step(&groups, learning_rate, |detector: &D, shown: &Shown| {
@@ -146,22 +154,36 @@ impl DetectorRun<'_> {
         Ok((learner, loss))
     }
 
-    /// A group's pictures: a few of each of some trials.
-    fn draw(&self, seed: Seed) -> Result<Shown, TrainError> {
-        let mut rng = seed.rng();
+    /// What a step looks at, group by group: some trials, and a few frames of each.
+    fn draw(&self, step: u32) -> Vec<Vec<(usize, Vec<usize>)>> {
+        let seed = self.seed.derive("detector_step", &[u64::from(step)]);
+        let of_group = |group: usize| {
+            let mut rng = seed.derive("group", &[group as u64]).rng();
+            let mut n_left = self.config.detector.n_pictures().div_ceil(GROUPS);
+            let mut drawn = Vec::new();
+            while n_left > 0 {
+                let trial = rng.random_range(0..self.data.trials.len());
+                let mut frames: Vec<usize> = (0..self.data.trials[trial].n_frames).collect();
+                frames.shuffle(&mut rng);
+                frames.truncate(OF_TRIAL.min(n_left));
+                frames.sort_unstable();
+                n_left -= frames.len();
+                drawn.push((trial, frames));
+            }
+            drawn
+        };
+        (0..GROUPS).map(of_group).collect()
+    }
+
+    /// A group's pictures with what is to be seen in them.
+    fn show(&self, drawn: &[(usize, Vec<usize>)]) -> Result<Shown, TrainError> {
         let width = Observation::width(self.data.n_slots);
         let (across, down) = self.gallery.size();
         let mut shown = Shown { pictures: Pictures::of_size(across, down), rows: Vec::new() };
-        let mut n_left = self.config.detector.n_pictures().div_ceil(GROUPS);
-        while n_left > 0 {
-            let trial = rng.random_range(0..self.data.trials.len());
-            let of = &self.data.trials[trial];
-            let mut all: Vec<usize> = (0..of.n_frames).collect();
-            let (frames, _) = all.partial_shuffle(&mut rng, OF_TRIAL.min(n_left));
-            frames.sort_unstable();
-            fetch(self.data, self.gallery, trial, frames, &mut shown.pictures)?;
-            shown.rows.extend(frames.iter().flat_map(|&frame| &of.observations[frame * width..][..width]));
-            n_left -= frames.len();
+        for (trial, frames) in drawn {
+            fetch(self.data, self.gallery, *trial, frames, &mut shown.pictures)?;
+            let observations = &self.data.trials[*trial].observations;
+            shown.rows.extend(frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
         }
         Ok(shown)
     }

@@ -39,6 +39,8 @@ mod painter;
 #[cfg(test)]
 mod pipeline;
 #[cfg(test)]
+mod pipeline_pictures;
+#[cfg(test)]
 mod pipeline_suites;
 #[cfg(test)]
 mod publish;

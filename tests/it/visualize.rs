@@ -176,7 +176,7 @@ fn replays_of_a_tower() -> (Episode, Episode, Episode) {
 #[test]
 fn a_recording_has_scene_programs_scopes_and_words_on_two_timelines() {
     let (_, shown, acted) = replays_of_a_tower();
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     let chunks = read.only();
     let found = entities(chunks);
     let bodies = acted.scene.bodies.iter().map(|body| format!("/world/bodies/{}", body.name));
@@ -267,7 +267,7 @@ fn check_lanes(chunks: &[Chunk], root: &str, episode: &Episode) {
 fn each_calls_lane_begins_and_ends_at_its_frames() {
     let (expert, shown, acted) = replays_of_a_tower();
     check_lanes(read_back(&[Replay::from(&expert)]).only(), "programs", &expert);
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     check_lanes(read.only(), "programs", &acted);
     check_lanes(read.only(), "programs_of_expert", &shown);
 }
@@ -276,7 +276,7 @@ fn each_calls_lane_begins_and_ends_at_its_frames() {
 fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
     let (_, shown, acted) = replays_of_a_tower();
     let divergence = Divergence { decision: 6, kind: DivergenceKind::Argument, program: Program::Pick };
-    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence) };
+    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence), cameras: &[] };
     let read = read_back(&[replay]);
     let frame = i64::from(acted.calls[7].frames.begin);
     assert!(frame > 0);
@@ -335,7 +335,7 @@ fn bars(chunks: &[Chunk], entity: &str) -> Vec<Option<(f32, f32)>> {
 fn scopes_are_the_output_spans_on_the_boundary_frames_of_the_specification() {
     let (expert, shown, acted) = replays_of_a_tower();
     for (episode, demonstration) in [(&expert, None), (&acted, Some(&shown))] {
-        let read = read_back(&[Replay { episode, demonstration, divergence: None }]);
+        let read = read_back(&[Replay { episode, demonstration, divergence: None, cameras: &[] }]);
         let spans = if demonstration.is_none() { episode.clone().boundaries_only() } else { episode.clone() };
         for depth in 0..3_u8 {
             let entity = format!("/specification/scope/depth_{depth}");
@@ -367,7 +367,10 @@ fn probabilities_are_those_of_the_decisions() {
 #[test]
 fn the_same_replays_give_the_same_bytes() {
     let (expert, shown, acted) = replays_of_a_tower();
-    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None }];
+    let replays = [
+        Replay::from(&expert),
+        Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] },
+    ];
     let (first, second) = (read_back(&replays), read_back(&replays));
     let (first, second) = (std::fs::read(&first.path).unwrap(), std::fs::read(&second.path).unwrap());
     let first_difference = first.iter().zip(&second).position(|(a, b)| a != b);
@@ -489,7 +492,7 @@ fn a_demonstration_of_another_length_is_refused_by_number() {
     let foreign = demonstration(&other, &trial(&other, 0, 1), 3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("episode.rrd");
-    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None }];
+    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None, cameras: &[] }];
     let error = save_replays(&replays, &path).unwrap_err();
     let expected = "episode 42 was given a specification of 13 frames, but the demonstration to show beside it \
                     (episode 3) has 5 boundary frames";

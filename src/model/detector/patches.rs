@@ -97,7 +97,8 @@ mod tests {
         let mut pictures = Pictures::of_size(4, 4);
         pictures.push(&[0; 48]);
         // The second of two things at (2, 1), the robot at (3, 1), half the first thing's at (2, 2).
-        let claims = Claims::made(3, vec![(2, 1, [0.0, 0.0, 1.0]), (3, 1, [1.0, 0.0, 0.0]), (2, 2, [0.0, 0.5, 0.5])]);
+        let points = vec![(2, 1, [0.0, 0.0, 1.0]), (3, 1, [1.0, 0.0, 0.0]), (2, 2, [0.0, 0.5, 0.5])];
+        let claims = Claims::made(3, points, vec![0.2; 16]);
         let claimed = Claimed { pictures: &pictures, claims: &claims, n_things: 2 };
         // The robot and the first thing lie in the middle of the picture, the second at its right end.
         let centres = [0.0, 0.0, 0.0, 0.0, 0.9, 0.0];
