@@ -17,9 +17,11 @@
 
 mod claims;
 mod clusters;
+mod finding;
 mod foreground;
 
 pub(crate) use claims::Claims;
+pub(crate) use finding::{FIND_WIDTH, Find, Finder};
 
 use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;

@@ -26,37 +26,20 @@ pub(super) struct Claimed<'p> {
 }
 
 impl Claimed<'_> {
-    /// The patches of some slots in each picture, about the places where they are seen.
+    /// The patch of a slot in each picture, about the pixels `centres` of each.
     ///
     /// # Shapes
     ///
-    /// `centres` is `[F, K, width]` and begins with x and y; the result is `[F, slots, side * side * CHANNELS]`.
-    pub(super) fn patches(
-        &self,
-        centres: &[f32],
-        width: usize,
-        slots: std::ops::Range<usize>,
-        side: usize,
-    ) -> Vec<f32> {
-        let n_slots = self.claims.n_slots;
+    /// `[F, side * side * CHANNELS]`
+    pub(super) fn patches(&self, slot: usize, centres: &[[f32; 2]], side: usize) -> Vec<f32> {
         let n_cells = side * side * CHANNELS;
-        let mut patches = vec![0.0; self.pictures.n * slots.len() * n_cells];
-        let of_picture = patches.chunks_exact_mut((slots.len() * n_cells).max(1));
-        for (picture, patches) in of_picture.enumerate() {
-            let centres = &centres[picture * n_slots * width..][..n_slots * width];
-            for (slot, patch) in slots.clone().zip(patches.chunks_exact_mut(n_cells)) {
-                let corner = self.corner([centres[slot * width], centres[slot * width + 1]], side);
-                self.brightness(picture, corner, side, patch);
-                self.claims(picture, slot, corner, side, patch);
-            }
+        let mut patches = vec![0.0; centres.len() * n_cells];
+        for ((picture, centre), patch) in centres.iter().enumerate().zip(patches.chunks_exact_mut(n_cells.max(1))) {
+            let corner = centre.map(|pixel| pixel.floor() as i64 - side as i64 / 2);
+            self.brightness(picture, corner, side, patch);
+            self.claims(picture, slot, corner, side, patch);
         }
         patches
-    }
-
-    /// Column and row of a patch's upper left cell.
-    fn corner(&self, [x, y]: [f32; 2], side: usize) -> [i64; 2] {
-        let pixel = |place: f32, size: usize| ((place + 1.0) / 2.0 * size as f32).floor() as i64 - side as i64 / 2;
-        [pixel(x, self.pictures.width), pixel(y, self.pictures.height)]
     }
 
     fn brightness(&self, picture: usize, corner: [i64; 2], side: usize, patch: &mut [f32]) {
@@ -88,7 +71,7 @@ impl Claimed<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{CHANNELS, Claimed, GAIN};
+    use super::{Claimed, GAIN};
     use crate::model::colour_slots::Claims;
     use crate::model::pictures::Pictures;
 
@@ -100,10 +83,8 @@ mod tests {
         let points = vec![(2, 1, [0.0, 0.0, 1.0]), (3, 1, [1.0, 0.0, 0.0]), (2, 2, [0.0, 0.5, 0.5])];
         let claims = Claims::made(3, points, vec![0.2; 16]);
         let claimed = Claimed { pictures: &pictures, claims: &claims, n_things: 2 };
-        // The robot and the first thing lie in the middle of the picture, the second at its right end.
-        let centres = [0.0, 0.0, 0.0, 0.0, 0.9, 0.0];
-        let patches = claimed.patches(&centres, 2, 1..3, 2);
-        let (first, second) = patches.split_at(4 * CHANNELS);
+        let first = claimed.patches(1, &[[2.0, 2.0]], 2);
+        let second = claimed.patches(2, &[[3.8, 2.0]], 2);
         let bright = GAIN * 0.2;
         assert_eq!(first[..4], [0.0, 0.0, 0.0, bright]);
         assert_eq!(first[4..8], [0.0, GAIN, 0.0, bright]);
@@ -111,7 +92,7 @@ mod tests {
         assert_eq!(second[..4], [GAIN, 0.0, 0.0, bright]);
         assert_eq!(second[4..8], [0.0, 0.0, GAIN, bright]);
         // Of the robot all things are one.
-        let robot = claimed.patches(&centres, 2, 0..1, 2);
+        let robot = claimed.patches(0, &[[2.0, 2.0]], 2);
         assert_eq!(robot[4..8], [0.0, GAIN, 0.0, bright]);
     }
 }

@@ -1,5 +1,5 @@
-//! A detector on colour slots: where each colour lies in the picture, how much of it there is, how the others lie to it
-//! and what surrounds it tell where its object is.
+//! A detector on colour slots: where each colour is densest in the picture, how much of it there is, how the others lie to
+//! it and what surrounds it tell where its object is.
 //!
 //! ```text
 //! colour slots ─► place, mass, spread ──┐
@@ -8,7 +8,7 @@
 //!         patch about the robot ──────────► position of the gripper ─┘
 //! ```
 //!
-//! A patch shows what hides a thing, on what it stands and where its edges lie, which moments of its visible part do
+//! Colours are found, and slots told by them, before the first step; they are not learned further. A patch shows what hides a thing, on what it stands and where its edges lie, which moments of its visible part do
 //! not. All things share their weights but for a bias; things and gripper are placed by themselves, since where a thing
 //! is does not depend on where the gripper is.
 //!
@@ -22,19 +22,23 @@ use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
-use crate::model::colour_slots::{ColourSlots, ColourSlotsConfig};
+use crate::model::colour_slots::{ColourSlots, ColourSlotsConfig, FIND_WIDTH, Find, Finder};
 use crate::model::detector::Detector;
 use crate::model::detector::assignment::colours_of_slots;
 use crate::model::detector::patches::{CHANNELS, Claimed};
 use crate::model::layers::{Init, Mlp};
-use crate::model::perception::{PERCEPT_WIDTH, Perception as _};
+use crate::model::perception::Perception as _;
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::seed::Seed;
 
-/// What a percept tells by itself: [`PERCEPT_WIDTH`] numbers and three products of its place.
-const LOOK_WIDTH: usize = PERCEPT_WIDTH + 3;
-/// Percepts are scaled so that neighbouring things differ by about one.
-const LOOK_GAIN: f32 = 3.0;
+/// What a find tells by itself: its numbers and three products of its place.
+const LOOK_WIDTH: usize = FIND_WIDTH + 3;
+/// Places, from -1 to 1 across and down the picture, are scaled so that neighbouring things differ by about one.
+const PLACE_GAIN: f32 = 3.0;
+/// Pixels that make a mass of one, as a share of the picture: a block.
+const MASS_SHARE: f32 = 1.0 / 128.0;
+/// Pixels that make a spread of one, as a share of the picture's width: about a block's.
+const SPREAD_SHARE: f32 = 1.0 / 32.0;
 
 /// Sizes of the detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,9 +88,18 @@ pub struct PointDetector {
     gripper_place: Linear,
 }
 
-/// What is seen of some pictures before anything is told of it.
+/// A find as numbers of about one, with products of its place.
+fn told(find: &Find, pictures: &Pictures) -> [f32; LOOK_WIDTH] {
+    let pixels = [pictures.width as f32, pictures.height as f32];
+    let [x, y] = [0, 1].map(|axis| PLACE_GAIN * (2.0 * find.centre[axis] / pixels[axis] - 1.0));
+    let mass = |pixels_claimed: f32| pixels_claimed / (MASS_SHARE * pixels[0] * pixels[1]);
+    let spread = find.spread.map(|deviation| deviation / (SPREAD_SHARE * pixels[0]));
+    [x, y, mass(find.mass), spread[0], spread[1], mass(find.elsewhere), x * y, x * x, y * y]
+}
+
+/// What is seen of some pictures before anything is told of it, the robot first.
 struct Looks {
-    /// `[F, K, LOOK_WIDTH]`
+    /// `[F, N + 1, LOOK_WIDTH]`
     looks: Tensor<3>,
     /// `[F, N, patch]`
     patches: Tensor<3>,
@@ -96,24 +109,29 @@ struct Looks {
 
 impl PointDetector {
     fn look(&self, pictures: &Pictures) -> Looks {
-        let seen = self.perception.look(pictures); // [F, K, PERCEPT_WIDTH]
-        let device = seen.device();
+        let device = self.place.weight.device();
         let claims = self.perception.claims(pictures);
         let claimed = Claimed { pictures, claims: &claims, n_things: self.n_slots };
-        let centres: Vec<f32> = seen.clone().into_data().try_into_vec().unwrap_or_default();
-        let cut = |slots: std::ops::Range<usize>, side: usize| {
-            let shape = [pictures.n, slots.len(), side * side * CHANNELS];
-            let values = claimed.patches(&centres, PERCEPT_WIDTH, slots, side);
-            Tensor::<3>::from_data(TensorData::new(values, shape), &device)
-        };
-        let seen = seen * LOOK_GAIN;
-        let [x, y] = [0, 1].map(|axis| seen.clone().narrow(2, axis, 1));
-        let products = vec![seen, x.clone() * y.clone(), x.powf_scalar(2.0), y.powf_scalar(2.0)];
-        Looks {
-            looks: Tensor::cat(products, 2),
-            patches: cut(1..self.n_slots + 1, self.patch),
-            gripper_patch: cut(0..1, self.gripper_patch).flatten::<2>(1, 2),
+        let mut finder = Finder::new(pictures.width, pictures.height);
+        let n_percepts = self.n_slots + 1;
+        let mut looks = vec![0.0; pictures.n * n_percepts * LOOK_WIDTH];
+        let mut patches = Vec::with_capacity(n_percepts);
+        for slot in 0..n_percepts {
+            let side = if slot == 0 { self.gripper_patch } else { self.patch };
+            let finds: Vec<Find> =
+                (0..pictures.n).map(|picture| finder.find(&claims, picture, slot, side / 2)).collect();
+            for (picture, find) in finds.iter().enumerate() {
+                let at = (picture * n_percepts + slot) * LOOK_WIDTH;
+                looks[at..at + LOOK_WIDTH].copy_from_slice(&told(find, pictures));
+            }
+            let centres: Vec<[f32; 2]> = finds.iter().map(|find| find.centre).collect();
+            let shape = [pictures.n, 1, side * side * CHANNELS];
+            let patch = TensorData::new(claimed.patches(slot, &centres, side), shape);
+            patches.push(Tensor::<3>::from_data(patch, &device));
         }
+        let looks = TensorData::new(looks, [pictures.n, n_percepts, LOOK_WIDTH]);
+        let gripper_patch = patches.remove(0).flatten::<2>(1, 2);
+        Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1), gripper_patch }
     }
 
     /// The most that the other slots and the robot tell of each thing by where they lie to it: `[F, N, pair]`.
