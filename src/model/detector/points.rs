@@ -52,7 +52,8 @@ pub struct PointDetectorConfig {
     pub pair_width: usize,
     /// Pixels across and down a thing's patch. Default a quarter of the picture.
     pub patch: usize,
-    /// Pixels across and down the gripper's patch. Default three eighths of the picture.
+    /// Pixels across and down the gripper's patch, which holds its shadow too: where that lies tells how high the gripper is.
+    /// Default half of the picture.
     pub gripper_patch: usize,
 }
 
@@ -60,7 +61,7 @@ impl PointDetectorConfig {
     /// The default widths with colour slots.
     pub fn of(perception: ColourSlotsConfig) -> Self {
         let pixels = perception.pixels;
-        Self { perception, width: 64, pair_width: 16, patch: pixels / 4, gripper_patch: 3 * pixels / 8 }
+        Self { perception, width: 64, pair_width: 16, patch: pixels / 4, gripper_patch: pixels / 2 }
     }
 }
 
@@ -117,9 +118,9 @@ impl PointDetector {
         let mut looks = vec![0.0; pictures.n * n_percepts * LOOK_WIDTH];
         let mut patches = Vec::with_capacity(n_percepts);
         for slot in 0..n_percepts {
-            let side = if slot == 0 { self.gripper_patch } else { self.patch };
-            let finds: Vec<Find> =
-                (0..pictures.n).map(|picture| finder.find(&claims, picture, slot, side / 2)).collect();
+            let (side, window) =
+                if slot == 0 { (self.gripper_patch, 3 * self.gripper_patch / 8) } else { (self.patch, self.patch / 2) };
+            let finds: Vec<Find> = (0..pictures.n).map(|picture| finder.find(&claims, picture, slot, window)).collect();
             for (picture, find) in finds.iter().enumerate() {
                 let at = (picture * n_percepts + slot) * LOOK_WIDTH;
                 looks[at..at + LOOK_WIDTH].copy_from_slice(&told(find, pictures));
