@@ -30,7 +30,7 @@ mod tables;
 pub use claims::{Claim, Note, Verdict};
 pub use detections::{DetectionError, DetectionsInput, InSight};
 pub use figures::{Figure, Grid, GridCell, PaperPoint, Point, Series};
-pub use interval::wilson;
+pub use interval::{student, wilson};
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
 pub use rollouts::RolloutsInput;
@@ -122,8 +122,11 @@ pub enum ReportError {
 
 /// An actor for an error.
 fn told(actor: &Actor) -> String {
-    let Actor { experiment, variant, train_tasks, specification: _, decoder } = actor;
+    let Actor { experiment, variant, tag, train_tasks, specification: _, decoder } = actor;
     let mut told = format!("experiment {experiment}, variant {variant}");
+    if let Some(tag) = tag {
+        told.push_str(&format!(" ({tag})"));
+    }
     if let Some(tasks) = train_tasks {
         told.push_str(&format!(" trained on {tasks} tasks"));
     }

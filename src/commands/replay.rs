@@ -7,13 +7,16 @@ use serde_json::{Value, json};
 
 use crate::artifact::Plan;
 use crate::cli::ReplayArgs;
+use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
+use crate::dataset::{Playback, play_back};
 use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
 use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
+use crate::scene::BodyIndex;
 use crate::task::TaskSet;
-use crate::trace::{Actor, Episode};
+use crate::trace::{Actor, Episode, Push};
 use crate::visualize::{self, Replay};
 
 /// An episode, with what is to be shown beside it.
@@ -28,6 +31,9 @@ struct Found {
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
+    if args.path.is_dir() && Kind::of(&args.path)? == Kind::Dataset {
+        return run_dataset(args);
+    }
     let mut found = find(&args.path, &args.episode)?;
     if args.verify {
         return verify(args, &found);
@@ -45,6 +51,35 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
     } else {
         let lines: Vec<String> = found.iter().map(|found| format!("{} → {place}", found.in_words())).collect();
         output::print(&lines.join("\n"))?;
+    }
+    Ok(CommandOutcome::Done)
+}
+
+/// Shows episodes of a dataset: also of one that was annotated elsewhere, of which there is no recording.
+fn run_dataset(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
+    let wrong = |problem: &str| Err(UsageError(problem.to_owned()).into());
+    if args.verify {
+        return wrong("a dataset cannot be simulated again; --verify takes the recordings that it was made of");
+    }
+    let playbacks =
+        args.episode.iter().map(|&episode| play_back(&args.path, episode)).collect::<Result<Vec<_>, _>>()?;
+    let (summary, place) = match &args.save {
+        Some(path) => (visualize::save_playbacks(&playbacks, path)?, path.display().to_string()),
+        None if args.spawn => (visualize::spawn_playbacks(&playbacks)?, "the Rerun viewer".to_owned()),
+        None => return wrong("replay of a dataset needs one of --save FILE.rrd, --spawn"),
+    };
+    let counts = |of: &Playback| (of.facts.episode_index, of.times_secs.len(), of.facts.calls.len());
+    if args.json {
+        let episodes = playbacks.iter().map(counts);
+        let episodes: Vec<Value> = episodes
+            .map(|(episode, frames, calls)| json!({ "episode": episode, "frames": frames, "calls": calls }))
+            .collect();
+        output::print_json(&json!({ "episodes": episodes, "bytes": summary.bytes, "written": place }))?;
+    } else {
+        let line = |(episode, frames, calls)| {
+            format!("episode {episode} of {} ({frames} frames, {calls} calls) → {place}", args.path.display())
+        };
+        output::print(&playbacks.iter().map(counts).map(line).collect::<Vec<String>>().join("\n"))?;
     }
     Ok(CommandOutcome::Done)
 }
@@ -89,6 +124,10 @@ impl Found {
         if let (Some(divergence), Some((frame, secs))) = (divergence, self.divergent_frame()) {
             words.push_str(&format!("; leaves the expert at {secs:.1} s, frame {frame}: {divergence}"));
         }
+        if !episode.pushes.is_empty() {
+            let times = episode.pushes.iter().map(|push| format!("{:.1} s", secs_of(episode, push.frames.begin)));
+            words.push_str(&format!("; the adversary pushes at {}", times.collect::<Vec<_>>().join(", ")));
+        }
         words
     }
 
@@ -104,8 +143,25 @@ impl Found {
             "calls": self.episode.calls.len(),
             "demonstration": self.demonstration.is_some(),
             "first_divergence": divergence,
+            "pushes": self.episode.pushes.iter().map(|push| push_to_json(&self.episode, push)).collect::<Vec<_>>(),
         })
     }
+}
+
+fn push_to_json(episode: &Episode, push: &Push) -> Value {
+    let name = |body: &BodyIndex| episode.scene.body(*body).name.as_str();
+    json!({
+        "frame": push.frames.begin,
+        "secs": secs_of(episode, push.frames.begin),
+        "body": name(&push.body),
+        "impulse_ns": push.impulse_ns,
+        "toppled": push.toppled.iter().map(name).collect::<Vec<_>>(),
+    })
+}
+
+/// The time of a frame since the episode began, in seconds.
+fn secs_of(episode: &Episode, frame: u32) -> f64 {
+    episode.frames.get(frame as usize).map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
 }
 
 /// The recording that an episode is in, and the episode; counted as [`find`] does.

@@ -82,8 +82,11 @@ fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
 fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
     let experiment = &context.pipeline.spec.name;
     let rollouts = rollout::units(context)?;
-    let paths = rollouts.iter().map(|unit| unit.dir.path().join(rollout::TABLE));
-    inputs.rollouts.extend(paths.map(|path| RolloutsInput { experiment: experiment.clone(), path }));
+    inputs.rollouts.extend(rollouts.iter().map(|unit| RolloutsInput {
+        experiment: experiment.clone(),
+        tag: tag_of(context, unit),
+        path: unit.dir.path().join(rollout::TABLE),
+    }));
     for unit in &rollouts {
         if unit.dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
             let path = unit.dir.path().join(detections::TABLE);
@@ -97,6 +100,12 @@ fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), Pipeli
     Ok(())
 }
 
+/// The tag of the model that acts in a unit of the rollout stage.
+fn tag_of(context: &Context<'_>, unit: &Unit) -> Option<String> {
+    let Part::Suite { actor: Some(actor), .. } = unit.part else { return None };
+    context.pipeline.spec.models[actor.model].tag.clone()
+}
+
 fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
     let (task_set, _) = tasks::read(context)?;
     let n_seen = task_set.of_split(Split::Seen).count() as u32;
@@ -107,6 +116,7 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         let model = ModelSummary {
             experiment: context.pipeline.spec.name.clone(),
             variant: spec.variant.name().to_owned(),
+            tag: spec.tag.clone(),
             train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
             specification: spec.specification().name().to_owned(),
             seed: seed as i64,

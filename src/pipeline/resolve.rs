@@ -158,6 +158,9 @@ impl Pipeline {
     fn check_models(&self) -> Result<(), PipelineError> {
         let mut names = Vec::new();
         for (idx, model) in self.spec.models.iter().enumerate() {
+            if let Some(tag) = &model.tag {
+                check_name(&self.path, &format!("models[{idx}].tag"), tag)?;
+            }
             if model.seeds.is_empty() {
                 return Err(self.value(&format!("models[{idx}].seeds"), "is empty; at least one is needed"));
             }

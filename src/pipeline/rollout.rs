@@ -7,7 +7,7 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::json;
 
 use crate::artifact::{FileEntry, Plan, Receipt};
-use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
+use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
@@ -48,7 +48,7 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
             if actor.is_some_and(|actor| !spec.models[actor.model].acts(&suite_spec.name)) {
                 continue;
             }
-            let config = json!({
+            let mut config = json!({
                 "seed": spec.seed,
                 "suite": suite_spec,
                 "decoder": actor.map(|actor| actor.decoder),
@@ -57,6 +57,9 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
                 "decisions_factor": spec.rollout.decisions_factor,
                 "simulation": spec.generate.simulation,
             });
+            if let Some(tasks) = trained_on(context, actor, suite_spec) {
+                config["trained_on"] = json!(tasks);
+            }
             let shards = suite_spec.episodes.div_ceil(EPISODES_PER_SHARD);
             units.push(Unit {
                 name: format!("rollout {name} {}", suite_spec.name),
@@ -100,6 +103,13 @@ fn model_inputs(
     Ok(inputs)
 }
 
+/// How many of a suite's tasks an actor may be asked for: of the seen ones those that its model was trained on. `None`
+/// for all.
+fn trained_on(context: &Context<'_>, actor: Option<ModelActor>, suite: &SuiteSpec) -> Option<usize> {
+    let train_tasks = context.pipeline.spec.models[actor?.model].train_tasks?;
+    (suite.split == Split::Seen).then_some(train_tasks as usize)
+}
+
 /// What a unit's shards share.
 struct Suite<'a> {
     context: &'a Context<'a>,
@@ -114,7 +124,8 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let (task_set, _) = tasks::read(context)?;
     let spec = &context.pipeline.spec.rollout.suites[suite];
     let learned = actor.map(|actor| learned(context, actor, &task_set));
-    let suite = Suite { context, unit, spec, tasks: suite_tasks(context, &task_set, spec)?, learned };
+    let tasks = suite_tasks(context, &task_set, spec, trained_on(context, actor, spec))?;
+    let suite = Suite { context, unit, spec, tasks, learned };
     unit.dir.begin(&unit.plan)?;
     let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
     let shards = context.shards(unit)?;
@@ -157,7 +168,7 @@ impl Learned {
     /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
     /// another variant.
     fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
-        let (found, policy) = load_policy(&self.folder, self.decoder)?;
+        let found = load_config(&self.folder)?;
         let family = context.pipeline.spec.tasks.family;
         let mut wanted =
             ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
@@ -165,7 +176,7 @@ impl Learned {
             wanted.network = wanted.network.seeing(camera.size_px[0] as usize, wanted.n_slots);
         }
         check_purpose(&found, &wanted, &self.folder)?;
-        Ok(policy)
+        Ok(load_policy(&self.folder, self.decoder)?.1)
     }
 }
 
@@ -175,12 +186,22 @@ fn demonstrations<'a>(context: &Context<'a>, suite: &'a SuiteSpec) -> Demonstrat
     Demonstrations { seed: spec.seed, suite, simulation: &spec.generate.simulation, frames: RecordedFrames::Boundaries }
 }
 
-/// The tasks that a suite asks for, in its order of sub-tasks.
-fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> Result<Vec<Task>, PipelineError> {
+/// The tasks that a suite asks for, in its order of sub-tasks; of the first `most` of its split.
+fn suite_tasks(
+    context: &Context<'_>,
+    task_set: &TaskSet,
+    spec: &SuiteSpec,
+    most: Option<usize>,
+) -> Result<Vec<Task>, PipelineError> {
     let demonstrations = demonstrations(context, spec);
     let ordered = |task: &Task| demonstrations.ordered(task);
     let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
-    let tasks: Vec<Task> = task_set.of_split(spec.split).filter(is_asked_for).filter_map(ordered).collect();
+    let tasks: Vec<Task> = task_set
+        .of_split(spec.split)
+        .take(most.unwrap_or(usize::MAX))
+        .filter(is_asked_for)
+        .filter_map(ordered)
+        .collect();
     if tasks.is_empty() {
         let (field, problem) = match (spec.order, spec.bowls) {
             (OrderSpec::Shuffled, _) => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),

@@ -125,6 +125,10 @@ impl Default for GenerateSpec {
 pub struct ModelSpec {
     /// Which model.
     pub variant: Variant,
+    /// What tells it apart from other models of its variant that are trained otherwise: letters, digits, `_` and `-`.
+    /// The report shows it beside the variant's name, and leaves tagged models out of the paper's figures and claims.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag: Option<String>,
     /// One training run for each.
     #[serde(default = "one_seed")]
     pub seeds: Vec<u64>,
@@ -198,7 +202,7 @@ impl Default for RolloutSpec {
 pub struct SuiteSpec {
     /// Names its folder: letters, digits, `_` and `-`.
     pub name: String,
-    /// Which tasks.
+    /// Which tasks; of the seen ones those that the acting model was trained on.
     pub split: Split,
     /// How many episodes; tasks are taken in turn.
     pub episodes: u32,

@@ -163,7 +163,7 @@ impl<'a> Ours<'a> {
     /// A variant's rows in a suite, by the decoder that stands for it, the most training tasks first.
     fn rows(&self, variant: &str, suite: &str) -> Vec<&'a Aggregate> {
         let name = format!("{variant}{}", self.suffix);
-        let is_own = |row: &&Aggregate| row.actor.variant == name && row.actor.is_demonstrated() && row.suite == suite;
+        let is_own = |row: &&Aggregate| row.actor.variant == name && row.actor.is_the_papers() && row.suite == suite;
         let own = self.aggregates.iter().filter(is_own);
         let mut own: Vec<&Aggregate> = own.collect();
         own.sort_by_cached_key(|row| order::actor(&row.actor));

@@ -154,6 +154,11 @@ impl Mp4Reader {
         self.size_px
     }
 
+    /// What a decoder must know before the first picture, in Annex B.
+    pub fn parameter_sets(&self) -> &[u8] {
+        &self.parameter_sets
+    }
+
     /// A sample as a packet in Annex B, which takes the place of what is in `packet`.
     ///
     /// # Errors

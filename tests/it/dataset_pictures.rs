@@ -2,27 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
-use ntp::dataset::{
-    ConvertConfig, DatasetWriter, EpisodePictures, EpisodeRows, FrameChoice, PictureLoader, RecordingEpisodes, convert,
-    read_trials, validate,
-};
-use ntp::recording::{CameraPictures, RecordingError, ShardReader, ShardWriter};
-use ntp::render::{CameraConfig, PictureFormat, PictureQuality, Renderer, Viewpoint};
+use ntp::dataset::edit::{Condition, SplitBy, diff, filter, merge, repair, split};
+use ntp::dataset::{ConvertConfig, EpisodePictures, FrameChoice, RecordingEpisodes, convert, read_trials, validate};
+use ntp::recording::{RecordingError, ShardReader, ShardWriter};
+use ntp::render::{CameraConfig, PictureFormat, Renderer, Viewpoint};
 use ntp::seed::Seed;
 use ntp::task::Split;
 use ntp::trace::Episode;
-use ntp::video::{Film, Mp4Reader, Mp4Writer, Rgb};
+use ntp::video::{Mp4Reader, Rgb};
 use re_lerobot::EpisodeIndex;
 use re_lerobot::datasetv3::LeRobotDatasetV3;
 
 use crate::dataset::{densify, episodes};
-use crate::kinematic::{demonstration, tower, trial};
 
 /// The feature of each camera, and how far a value may be off on average.
-const CAMERAS: [(&str, PictureFormat, f64); 2] =
+pub(crate) const CAMERAS: [(&str, PictureFormat, f64); 2] =
     [("front", PictureFormat::Png, 0.0), ("wrist", PictureFormat::H264, 8.0)];
 
-fn cameras() -> Vec<CameraConfig> {
+pub(crate) fn cameras() -> Vec<CameraConfig> {
     let of = |(name, format, _): (&str, PictureFormat, f64)| {
         let view = if name == "front" { Viewpoint::Front } else { Viewpoint::Wrist };
         CameraConfig { format, ..CameraConfig::new(view, [64, 48]) }
@@ -30,39 +27,53 @@ fn cameras() -> Vec<CameraConfig> {
     CAMERAS.into_iter().map(of).collect()
 }
 
-struct Made {
+pub(crate) struct Made {
     _folder: tempfile::TempDir,
-    root: PathBuf,
-    episodes: Vec<Episode>,
+    pub(crate) root: PathBuf,
+    pub(crate) episodes: Vec<Episode>,
 }
 
-/// Episodes with two frames between boundaries, filmed, recorded and converted.
-fn made(frames: FrameChoice) -> Made {
-    let folder = tempfile::tempdir().unwrap();
-    let episodes: Vec<Episode> = episodes().iter().map(|episode| densify(episode, 2)).collect();
-    let path = folder.path().join("shard.mcap");
-    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&cameras());
-    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
-    writer.finish().unwrap();
+/// Episodes with two frames between boundaries.
+fn dense() -> Vec<Episode> {
+    episodes().iter().map(|episode| densify(episode, 2)).collect()
+}
+
+/// Episodes, filmed, recorded and converted.
+pub(crate) fn made(frames: FrameChoice) -> Made {
+    let (folder, episodes) = (tempfile::tempdir().unwrap(), dense());
+    let path = film(folder.path(), "shard", &episodes, &cameras());
     let root = folder.path().join("dataset");
-    convert_to(&path, frames, &root);
+    convert_to(&[&path], frames, &root);
     Made { _folder: folder, root, episodes }
 }
 
-fn convert_to(path: &Path, frames: FrameChoice, root: &Path) {
+/// A recording of episodes.
+fn film(folder: &Path, name: &str, episodes: &[Episode], cameras: &[CameraConfig]) -> PathBuf {
+    let path = folder.join(format!("{name}.mcap"));
+    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(cameras);
+    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
+    writer.finish().unwrap();
+    path
+}
+
+fn convert_to(paths: &[&Path], frames: FrameChoice, root: &Path) {
     let config = ConvertConfig { frames, ..ConvertConfig::default() };
-    let reader = ShardReader::open(path).unwrap();
-    let file = || ("shard.mcap".to_owned(), "0".repeat(64));
+    let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
+    let sha256 = |path: &Path| ntp::artifact::sha256_bytes(name(path).as_bytes());
+    let readers = paths.iter().map(|path| (name(path), sha256(path), ShardReader::open(path).unwrap()));
     match frames {
         FrameChoice::All => {
-            let (file, sha256) = file();
-            let recording = RecordingEpisodes { file, sha256, episodes: reader.pictured() };
-            convert([Ok::<_, RecordingError>(recording)], &config, root).unwrap();
+            let recordings = readers.map(|(file, sha256, reader)| {
+                Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes: reader.pictured() })
+            });
+            convert(recordings, &config, root).unwrap();
         }
         FrameChoice::Boundaries => {
-            let (file, sha256) = file();
-            let recording = RecordingEpisodes { file, sha256, episodes: reader.boundaries().pictured() };
-            convert([Ok::<_, RecordingError>(recording)], &config, root).unwrap();
+            let recordings = readers.map(|(file, sha256, reader)| {
+                let episodes = reader.boundaries().pictured();
+                Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes })
+            });
+            convert(recordings, &config, root).unwrap();
         }
     }
 }
@@ -126,9 +137,11 @@ fn reruns_reader_opens_images_and_videos() {
 #[test]
 fn the_same_recordings_give_the_same_videos() {
     let [a, b] = [made(FrameChoice::All), made(FrameChoice::All)];
-    let video =
-        |made: &Made| std::fs::read(made.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4")).unwrap();
-    assert_eq!(video(&a), video(&b));
+    assert_eq!(video(&a.root), video(&b.root));
+}
+
+fn video(root: &Path) -> Vec<u8> {
+    std::fs::read(root.join("videos/observation.images.wrist/chunk-000/file-000.mp4")).unwrap()
 }
 
 #[test]
@@ -147,184 +160,163 @@ fn a_damaged_video_and_a_missing_one_are_found() {
     assert!(!codes(&made.root).is_empty());
 }
 
+/// The datasets `a` of the first episodes, `b` of the others, and `whole` of all, each episode with its pictures.
+fn parts(frames: FrameChoice) -> (tempfile::TempDir, [PathBuf; 3]) {
+    let (folder, episodes) = (tempfile::tempdir().unwrap(), dense());
+    let a = film(folder.path(), "first", &episodes[..2], &cameras());
+    let b = film(folder.path(), "second", &episodes[2..], &cameras());
+    let roots = ["a", "b", "whole"].map(|name| folder.path().join(name));
+    convert_to(&[&a], frames, &roots[0]);
+    convert_to(&[&b], frames, &roots[1]);
+    convert_to(&[&a, &b], frames, &roots[2]);
+    (folder, roots)
+}
+
+/// The pictures of each episode of a camera.
+fn all_pictures(root: &Path, camera: &str) -> Vec<Vec<Rgb>> {
+    let mut pictures = EpisodePictures::open(root, camera).unwrap();
+    (0..pictures.n_episodes()).map(|episode| pictures.read(episode).unwrap()).collect()
+}
+
+#[track_caller]
+fn assert_opens_in_rerun(root: &Path) {
+    let opened = LeRobotDatasetV3::load_from_directory(root).unwrap();
+    for (position, pictures) in all_pictures(root, "front").into_iter().enumerate() {
+        let rows = opened.read_episode_data(EpisodeIndex(position)).unwrap();
+        assert_eq!(rows.num_rows(), pictures.len(), "episode {position}");
+        assert!(rows.column_by_name("observation.images.front").is_some());
+        let video = opened.read_episode_video_contents("observation.images.wrist", EpisodeIndex(position)).unwrap();
+        assert_eq!(&video[4..8], b"ftyp");
+    }
+}
+
 #[test]
-fn any_rows_of_an_episode_are_those_of_the_whole() {
+fn merged_datasets_have_the_pictures_and_statistics_of_one_converted_at_once() {
     for frames in [FrameChoice::Boundaries, FrameChoice::All] {
-        let made = made(frames);
-        for (name, ..) in CAMERAS {
-            let mut pictures = EpisodePictures::open(&made.root, name).unwrap();
-            let whole = pictures.read(1).unwrap();
-            for rows in [vec![0], vec![whole.len() as u32 - 1], vec![1, 2, 5, 6], vec![3, 7], vec![]] {
-                let mut found = Vec::new();
-                pictures.visit(1, &rows, |picture| found.push(picture.clone())).unwrap();
-                let wanted: Vec<Rgb> = rows.iter().map(|&row| whole[row as usize].clone()).collect();
-                assert_eq!(found, wanted, "{name}, {rows:?}");
-            }
+        let (folder, [a, b, whole]) = parts(frames);
+        let merged = folder.path().join("merged");
+        let summary = merge(&[a, b], &merged).unwrap();
+        assert!(summary.files.iter().any(|file| file.ends_with(".mp4")));
+        assert_eq!(validate(&merged).findings, []);
+        for (camera, ..) in CAMERAS {
+            assert_eq!(all_pictures(&merged, camera), all_pictures(&whole, camera));
         }
-    }
-}
-
-/// Episodes with pictures that are large enough for several row groups.
-fn many(file_megabytes: u32) -> (tempfile::TempDir, Vec<Episode>) {
-    let task = tower("seven", &[0, 1, 2, 3, 4, 5, 6, 7], Split::Seen);
-    let episodes: Vec<Episode> = (0..26).map(|at| demonstration(&task, &trial(&task, at, 1), u64::from(at))).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("shard.mcap");
-    let camera = CameraConfig { quality: PictureQuality::Plain, ..CameraConfig::new(Viewpoint::Front, [320, 320]) };
-    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&[camera]);
-    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
-    writer.finish().unwrap();
-    let config = ConvertConfig { file_megabytes: file_megabytes.try_into().unwrap(), ..ConvertConfig::default() };
-    let file = ("shard.mcap".to_owned(), "0".repeat(64));
-    let episodes_of = ShardReader::open(&path).unwrap().boundaries().pictured();
-    let recording = RecordingEpisodes { file: file.0, sha256: file.1, episodes: episodes_of };
-    convert([Ok::<_, RecordingError>(recording)], &config, &folder.path().join("dataset")).unwrap();
-    (folder, episodes)
-}
-
-#[test]
-fn episodes_are_found_in_any_row_group_and_file() {
-    for (file_megabytes, n_files) in [(1, 2), (100, 1)] {
-        let (folder, episodes) = many(file_megabytes);
-        let root = folder.path().join("dataset");
-        let files = std::fs::read_dir(root.join("data/chunk-000")).unwrap().count();
-        assert!(files >= n_files, "{files} files");
-        let mut pictures = EpisodePictures::open(&root, "front").unwrap();
-        let config = CameraConfig { quality: PictureQuality::Plain, ..CameraConfig::new(Viewpoint::Front, [320, 320]) };
-        for at in [25, 0, 13, 24, 1] {
-            let mut film = Film::new(&config);
-            film.begin_episode(&episodes[at]).unwrap();
-            let last = episodes[at].frames.last().unwrap();
-            let wanted = &film.draw(&episodes[at].scene, &last.state).rgb;
-            let rows = [pictures.n_pictures(at) as u32 - 1];
-            pictures.visit(at, &rows, |picture| assert_eq!(&picture.bytes, wanted, "episode {at}")).unwrap();
+        assert!(video(&merged) == video(&whole));
+        assert!(diff(&merged, &whole).unwrap().is_none());
+        for file in ["meta/stats.json", "meta/info.json"] {
+            let [found, expected] = [&merged, &whole].map(|root| std::fs::read_to_string(root.join(file)).unwrap());
+            assert_eq!(found, expected, "{file}");
         }
-    }
-}
-
-fn listed(made: &Made) -> Vec<EpisodeRows> {
-    let trials = read_trials(&made.root).unwrap().trials;
-    trials.into_iter().map(|trial| EpisodeRows { episode: trial.episode, rows: trial.rows }).collect()
-}
-
-#[test]
-fn a_loader_gives_boundary_pictures_whatever_was_announced_within_its_limit() {
-    for frames in [FrameChoice::Boundaries, FrameChoice::All] {
-        let made = made(frames);
-        for (name, ..) in CAMERAS {
-            let mut pictures = EpisodePictures::open(&made.root, name).unwrap();
-            let list = listed(&made);
-            let mut wanted = Vec::new();
-            for EpisodeRows { episode, rows } in &list {
-                let mut bytes = Vec::new();
-                pictures.visit(*episode, rows, |picture| bytes.extend_from_slice(&picture.bytes)).unwrap();
-                wanted.push(bytes);
-            }
-            let largest = wanted.iter().map(Vec::len).max().unwrap();
-            for limit in [0, largest, usize::MAX] {
-                let loader = PictureLoader::open(&made.root, name, list.clone(), limit).unwrap();
-                for step in 0..3 * list.len() {
-                    // What is asked for was announced, now or before, or not at all.
-                    let position = (step * 7) % list.len();
-                    loader.announce(&[(position + step % 3) % list.len()]);
-                    assert!(*loader.get(position).unwrap() == wanted[position], "{name}, {step}");
-                    assert!(loader.n_bytes() <= limit.max(5 * largest), "{} bytes", loader.n_bytes());
-                }
-            }
-        }
+        assert_opens_in_rerun(&merged);
     }
 }
 
 #[test]
-fn a_loader_refuses_rows_without_pictures_before_anything_is_read() {
+fn a_filtered_dataset_has_the_pictures_of_its_episodes_alone() {
     let made = made(FrameChoice::Boundaries);
-    let mut list = listed(&made);
-    list[1].rows.push(500);
-    let error = PictureLoader::open(&made.root, "front", list, 0).err().unwrap().to_string();
-    assert!(error.contains("episode 1: observation.images.front: row 500 has no picture"), "{error}");
-    let loader = PictureLoader::open(&made.root, "front", listed(&made), 0).unwrap();
-    assert!(loader.get(99).unwrap_err().to_string().contains("no pictures at position 99"));
-}
-
-/// What reading an episode of a changed dataset says.
-fn said(made: &Made, camera: &str, episode: usize) -> String {
-    EpisodePictures::open(&made.root, camera).unwrap().read(episode).unwrap_err().to_string()
+    let unseen: Vec<usize> = (0..made.episodes.len())
+        .filter(|&position| made.episodes[position].provenance.split == Split::Unseen)
+        .collect();
+    assert!(unseen[0] > 0 && unseen.len() > 1);
+    let folder = tempfile::tempdir().unwrap();
+    let (filtered, alone) = (folder.path().join("filtered"), folder.path().join("alone"));
+    filter(&made.root, &Condition { split: Some(Split::Unseen), ..Condition::default() }, &filtered).unwrap();
+    let wanted: Vec<Episode> = unseen.iter().map(|&position| made.episodes[position].clone()).collect();
+    convert_to(&[&film(folder.path(), "shard", &wanted, &cameras())], FrameChoice::Boundaries, &alone);
+    assert_eq!(validate(&filtered).findings, []);
+    for (camera, ..) in CAMERAS {
+        let all = all_pictures(&made.root, camera);
+        let expected: Vec<_> = unseen.iter().map(|&position| all[position].clone()).collect();
+        assert_eq!(all_pictures(&filtered, camera), expected);
+    }
+    let stats = |root: &Path| -> serde_json::Value { ntp::artifact::read_json(&root.join("meta/stats.json")).unwrap() };
+    for (camera, ..) in CAMERAS {
+        let feature = format!("observation.images.{camera}");
+        assert_eq!(stats(&filtered)[&feature], stats(&alone)[&feature]);
+    }
+    assert_opens_in_rerun(&filtered);
 }
 
 #[test]
-fn a_video_that_lacks_frames_or_does_not_decode_is_named_with_episode_and_camera() {
+fn parts_of_a_split_dataset_hold_every_picture_once() {
+    let made = made(FrameChoice::Boundaries);
+    let folder = tempfile::tempdir().unwrap();
+    let parts = split(&made.root, &SplitBy::Task, &folder.path().join("parts")).unwrap();
+    let mut n_pictures = 0;
+    for (name, _) in &parts {
+        let part = folder.path().join("parts").join(name);
+        assert_eq!(validate(&part).findings, []);
+        n_pictures += all_pictures(&part, "wrist").concat().len();
+    }
+    assert_eq!(n_pictures, all_pictures(&made.root, "wrist").concat().len());
+}
+
+#[test]
+fn a_repaired_dataset_ends_before_the_first_picture_that_cannot_be_decoded() {
     let made = made(FrameChoice::Boundaries);
     let path = made.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4");
-    let whole = std::fs::read(&path).unwrap();
-    // As many samples as the first episode has.
-    let mut reader = Mp4Reader::open(&path).unwrap();
-    let shorter = made.root.join("shorter.mp4");
-    let mut writer = Mp4Writer::create(&shorter, [64, 48], 10).unwrap();
+    let before = all_pictures(&made.root, "wrist");
+    let offset = sample_offset(&path, before[..3].concat().len());
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[offset + 40..offset + 200].fill(0x55);
+    std::fs::write(&path, &bytes).unwrap();
+    let mended = made.root.with_file_name("mended");
+    let repaired = repair(&made.root, &mended).unwrap();
+    assert_eq!(repaired.written.unwrap().episodes, 3);
+    assert!(
+        repaired.reasons.iter().any(|reason| reason.contains("observation.images.wrist")),
+        "{:?}",
+        repaired.reasons
+    );
+    assert_eq!(validate(&mended).findings, []);
+    assert_eq!(all_pictures(&mended, "wrist"), before[..3]);
+}
+
+/// Where a sample of a video begins: samples lie one after another behind the head of the box `mdat`.
+fn sample_offset(path: &Path, sample: usize) -> usize {
+    let bytes = std::fs::read(path).unwrap();
+    let begin = bytes.windows(4).position(|name| name == b"mdat").unwrap() + 4;
+    let mut reader = Mp4Reader::open(path).unwrap();
     let mut packet = Vec::new();
-    for sample in 0..EpisodePictures::open(&made.root, "wrist").unwrap().n_pictures(0) {
+    let sets = reader.parameter_sets().len();
+    (0..sample).fold(begin, |offset, sample| {
         reader.read(sample, &mut packet).unwrap();
-        writer.write(&packet).unwrap();
-    }
-    writer.finish().unwrap();
-    std::fs::rename(&shorter, &path).unwrap();
-    assert!(EpisodePictures::open(&made.root, "wrist").unwrap().read(0).is_ok());
-    let error = said(&made, "wrist", 1);
-    assert!(error.contains("episode 1: observation.images.wrist: picture of row"), "{error}");
-    assert!(error.contains("no picture"), "{error}");
-    let mut damaged = whole;
-    let end = damaged.len() / 2;
-    damaged[64..end].fill(0x55);
-    std::fs::write(&path, damaged).unwrap();
-    let error = said(&made, "wrist", 0);
-    assert!(error.contains("episode 0: observation.images.wrist: "), "{error}");
+        offset + packet.len() - if reader.samples()[sample].is_key { sets } else { 0 }
+    })
 }
 
 #[test]
-fn pictures_of_another_size_than_declared_are_named_with_episode_and_camera() {
-    let made = made(FrameChoice::Boundaries);
-    let path = made.root.join("meta/info.json");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let mut info: serde_json::Value = serde_json::from_str(&text).unwrap();
-    for (name, ..) in CAMERAS {
-        info["features"][format!("observation.images.{name}")]["shape"] = serde_json::json!([64, 64, 3]);
-    }
-    std::fs::write(&path, info.to_string()).unwrap();
-    for (name, ..) in CAMERAS {
-        let error = said(&made, name, 2);
-        let expected = format!("episode 2: observation.images.{name}: picture of row");
-        assert!(error.contains(&expected) && error.contains("64x48 pixels, expected 64x64"), "{error}");
-    }
+fn a_difference_names_the_pictures_that_changed() {
+    let [a, b] = [made(FrameChoice::Boundaries), made(FrameChoice::Boundaries)];
+    assert!(diff(&a.root, &b.root).unwrap().is_none());
+    let path = b.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4");
+    let pictures = all_pictures(&b.root, "wrist");
+    let offset = sample_offset(&path, pictures[..2].concat().len());
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[offset + 40] ^= 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let found = diff(&a.root, &b.root).unwrap();
+    assert_eq!((found.changed, found.same), (1, a.episodes.len() as u64 - 1));
+    assert_eq!(found.changed_episodes[0].before.episode_index, 2);
+    assert_eq!(found.changed_episodes[0].frames, [("observation.images.wrist".to_owned(), 1)].into());
 }
 
 #[test]
-fn a_recording_without_all_pictures_of_an_episode_makes_no_dataset() {
-    let folder = tempfile::tempdir().unwrap();
-    let episode = densify(&episodes()[0], 2);
-    let path = folder.path().join("shard.mcap");
-    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&cameras());
-    writer.write(&episode).unwrap();
-    writer.finish().unwrap();
-    let whole = ShardReader::open(&path).unwrap().pictured().next().unwrap().unwrap();
-    let check = |change: &dyn Fn(&mut CameraPictures), problem: &str| {
-        let mut broken = whole.clone();
-        change(&mut broken.cameras[1]);
-        let root = folder.path().join("dataset");
-        let mut dataset = DatasetWriter::create(&root, &ConvertConfig::default()).unwrap();
-        let error = dataset.append_pictured(&broken, "shard.mcap", "0").unwrap_err().to_string();
-        assert!(error.contains("episode 0, camera wrist: ") && error.contains(problem), "{error}");
-        drop(dataset);
-        let left: Vec<_> = walk(&root);
-        assert!(left.is_empty(), "{left:?}");
-        std::fs::remove_dir_all(&root).unwrap();
+fn pictures_that_do_not_fit_together_are_refused_by_name() {
+    let (folder, [a, b, _]) = parts(FrameChoice::Boundaries);
+    let refused = |sources: &[PathBuf], code: &str, words: &str| {
+        let error = merge(sources, &folder.path().join("merged")).unwrap_err().to_string();
+        assert!(error.starts_with(code) && error.contains(words), "{error:?} is no {code} with {words:?}");
     };
-    let n_frames = episode.frames.len();
-    check(&|pictures| drop(pictures.pictures.pop()), &format!("it has {} pictures of {n_frames} frames", n_frames - 1));
-    check(&|pictures| pictures.pictures[3].truncate(20), "H.264");
-    check(&|pictures| pictures.pictures[0] = vec![0; 50], "H.264");
-}
-
-/// All files below a folder.
-fn walk(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
+    let other = folder.path().join("other");
+    let wider: Vec<_> = cameras().into_iter().map(|camera| CameraConfig { size_px: [96, 48], ..camera }).collect();
+    convert_to(&[&film(folder.path(), "wider", &dense()[2..], &wider)], FrameChoice::Boundaries, &other);
+    refused(&[a.clone(), other.clone()], "edit.features", "observation.images");
+    std::fs::remove_dir_all(&other).unwrap();
+    convert_to(&[&film(folder.path(), "blind", &dense()[2..], &[])], FrameChoice::Boundaries, &other);
+    refused(&[a.clone(), other], "edit.features", "observation.images");
+    let info = b.join("meta/info.json");
+    let text = std::fs::read_to_string(&info).unwrap();
+    std::fs::write(&info, text.replace("\"h264\"", "\"av1\"")).unwrap();
+    refused(&[a, b], "edit.video", "av1");
 }

@@ -6,10 +6,14 @@ mod architecture;
 mod artifact;
 #[cfg(test)]
 mod cli;
+#[cfg(all(test, feature = "cloud"))]
+mod cloud;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
 mod dataset_edit;
+#[cfg(test)]
+mod dataset_loading;
 #[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
@@ -18,6 +22,8 @@ mod detecting;
 mod expert;
 #[cfg(test)]
 mod export;
+#[cfg(test)]
+mod forward;
 #[cfg(test)]
 mod fuzz;
 #[cfg(test)]
@@ -42,6 +48,8 @@ mod pipeline;
 mod pipeline_pictures;
 #[cfg(test)]
 mod pipeline_suites;
+#[cfg(test)]
+mod playback;
 #[cfg(test)]
 mod publish;
 #[cfg(test)]

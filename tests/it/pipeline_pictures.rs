@@ -168,12 +168,13 @@ fn a_camera_that_sees_nothing_is_named_with_the_episode_and_leaves_nothing() {
 #[test]
 fn a_model_made_for_another_size_of_pictures_is_refused_with_both_sizes() {
     let (folder, pipeline, out) = finished();
-    let config = folder.path().join("run/models/ntp_vid_e2e-seed0/config.json");
-    let text = std::fs::read_to_string(&config).unwrap();
-    let other = text.replace("\"pixels\": 32", "\"pixels\": 48");
-    assert_ne!(other, text);
-    std::fs::write(&config, other).unwrap();
-    std::fs::remove_dir_all(folder.path().join("run/rollouts")).unwrap();
+    let other = tempfile::tempdir().unwrap();
+    let [larger, larger_out] = written(other.path(), |text| text.replacen("[32, 32]", "[48, 48]", 1));
+    let (code, stderr) = command(&["run", &larger, "--out", &larger_out, "--to", "train"]);
+    assert_eq!(code, 0, "{stderr}");
+    let models = folder.path().join("run/models");
+    std::fs::remove_dir_all(&models).unwrap();
+    std::fs::rename(other.path().join("run/models"), &models).unwrap();
     let (code, stderr) = command(&["rollout", &pipeline, "--out", &out]);
     assert_eq!(code, 1);
     assert!(stderr.contains("pixels across a picture") && stderr.contains("48") && stderr.contains("32"), "{stderr}");

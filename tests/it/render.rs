@@ -231,15 +231,15 @@ fn any_two_letters_of_one_color_differ_at_64_pixels() {
             state.bodies_in_world[body] = pose;
             let picture = renderer.draw(&scene, &state, &camera);
             let pixels = (0..64 * 64).filter(|&pixel| picture.segments[pixel] == 3 + body as u16);
-            pixels.map(|pixel| f32::from(picture.rgb[3 * pixel + 1])).collect::<Vec<f32>>()
+            pixels.flat_map(|pixel| &picture.rgb[3 * pixel..][..3]).copied().collect::<Vec<u8>>()
         };
-        let blocks: Vec<Vec<f32>> = (0..8).map(&mut shown).collect();
+        let blocks: Vec<Vec<u8>> = (0..8).map(&mut shown).collect();
         for (at, one) in blocks.iter().enumerate() {
             for (other_at, other) in blocks.iter().enumerate().skip(at + 1) {
-                assert!((20..60).contains(&one.len()) && one.len() == other.len(), "{} pixels", one.len());
-                let squares: f32 = one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum();
-                let apart = (squares / one.len() as f32).sqrt();
-                assert!(apart > 8.0, "seed {seed}: letters {at} and {other_at} are {apart} of 255 apart");
+                assert!((60..180).contains(&one.len()) && one.len() == other.len(), "{} bytes", one.len());
+                let squares: u32 = one.iter().zip(other).map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2)).sum();
+                let apart = (squares as f32 / one.len() as f32).sqrt();
+                assert!(apart > 4.0, "seed {seed}: letters {at} and {other_at} are {apart} of 255 apart");
             }
         }
     }

@@ -414,6 +414,29 @@ fn the_authors_file_becomes_a_task_set() {
     assert_eq!(first.conditions[0], Condition::OnTop { upper: SlotIndex(2), lower: SlotIndex(6) });
 }
 
+/// As large as the authors' own.
+#[test]
+fn two_thousand_tasks_in_the_authors_form_come_back_as_they_were_split_at_a_thousand() {
+    let ours = sample(Family::BlockStacking, 1000, 1000, Seed(3)).unwrap();
+    let cube = |slot: SlotIndex| format!("cube_{}", slot.0);
+    let entry = |task: &Task| {
+        let goals = task
+            .goals
+            .iter()
+            .map(|goal| json!({"name": "pick_place", "src": cube(goal.source), "target": cube(goal.target)}));
+        let ends = task.conditions.iter().map(|condition| match *condition {
+            Condition::OnTop { upper, lower } => json!({"type": "on_top", "src": cube(upper), "target": cube(lower)}),
+            Condition::Inside { .. } => panic!("blocks lie in nothing"),
+        });
+        json!({"id": task.id, "goals": goals.collect::<Vec<_>>(), "end_constraints": ends.collect::<Vec<_>>()})
+    };
+    let mut file = authors_file();
+    file["tasks"] = ours.tasks.iter().map(entry).collect();
+    assert_eq!(write_and_import(&file, 1000).unwrap(), ours);
+    let other = write_and_import(&file, 400).unwrap();
+    assert_eq!((other.of_split(Split::Seen).count(), other.of_split(Split::Unseen).count()), (400, 1600));
+}
+
 #[test]
 fn an_imported_sorting_file_puts_categories_into_containers() {
     let mut file = authors_file();

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use ntp::model::Decisions;
 use ntp::program::Program;
 use ntp::rollout::{Decision, Divergence, DivergenceKind, Expectation, Limits, Oracle, Policy, Query, Start, run};
+use ntp::scene::BodyIndex;
 use ntp::task::{Split, Task};
-use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Span};
+use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Push, Span};
 use ntp::visualize::{Replay, VisualizeError, save, save_replays};
 use rerun::StoreKind;
 use rerun::external::re_log_encoding::DecoderApp;
@@ -121,15 +122,20 @@ fn read_back(replays: &[Replay<'_>]) -> Read {
     let summary = save_replays(replays, &path).unwrap();
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
     assert_eq!(summary.episodes, replays.len());
-    let mut read = Read { recordings: BTreeMap::new(), _folder: folder, path };
-    for message in decode(&read.path) {
+    Read { recordings: recordings(&path), _folder: folder, path }
+}
+
+/// The chunks of each recording in a file, blueprints left out.
+pub(crate) fn recordings(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
+    let mut recordings: BTreeMap<String, Vec<Chunk>> = BTreeMap::new();
+    for message in decode(path) {
         let LogMsg::ArrowMsg(store, message) = message else { continue };
         let chunk = Chunk::from_arrow_msg(&message).unwrap();
         if store.kind() == StoreKind::Recording {
-            read.recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
+            recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
         }
     }
-    read
+    recordings
 }
 
 impl Read {
@@ -139,11 +145,11 @@ impl Read {
     }
 }
 
-fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
+pub(crate) fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
     chunks.iter().map(|chunk| chunk.entity_path().to_string()).collect()
 }
 
-fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
+pub(crate) fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
     let found: Vec<&Chunk> =
         chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity && !chunk.is_static()).collect();
     assert_eq!(found.len(), 1, "{entity}");
@@ -155,7 +161,7 @@ fn times(chunk: &Chunk, timeline: &'static str) -> Vec<i64> {
 }
 
 /// Frames and labels of a lane.
-fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
+pub(crate) fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
     let chunk = temporal(chunks, entity);
     let component = rerun::StateChange::descriptor_state().component;
     let labels = chunk.iter_slices::<String>(component);
@@ -288,6 +294,35 @@ fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
     assert_eq!(told, [7]);
     let agreed = read_back(&[Replay { divergence: None, ..replay }]);
     assert_eq!(lane(agreed.only(), "/agreement"), [(0, "as the expert".to_owned())]);
+}
+
+#[test]
+fn a_push_is_an_arrow_a_lane_and_a_line_until_all_rests() {
+    let (expert, ..) = replays_of_a_tower();
+    let mut parts = expert.into_parts();
+    let boundaries: Vec<u32> =
+        parts.frames.iter().zip(0..).filter(|(frame, _)| frame.boundary).map(|(_, at)| at).collect();
+    let frames = Span { begin: boundaries[4] - 2, end: boundaries[4] + 1 };
+    let body = BodyIndex(1);
+    parts.pushes = vec![Push { frames, body, impulse_ns: [0.0, 0.06, 0.0], toppled: vec![body] }];
+    let episode = Episode::new(parts).unwrap();
+    let read = read_back(&[Replay::from(&episode)]);
+    let [begin, end] = [i64::from(frames.begin), i64::from(frames.last())];
+    let name = &episode.scene.body(body).name;
+    assert_eq!(lane(read.only(), "/adversary"), [(begin, format!("pushes {name} #0")), (end, String::new())]);
+    let arrow = temporal(read.only(), "/world/adversary");
+    assert_eq!(times(arrow, "frame"), [begin, end]);
+    let component = rerun::Arrows3D::descriptor_origins().component;
+    let origins: Vec<Option<[f32; 3]>> =
+        arrow.iter_slices::<[f32; 3]>(component).map(|row| row.first().copied()).collect();
+    let stood: [f32; 3] = episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
+    assert_eq!(origins, [Some(stood), None]);
+    let log = temporal(read.only(), "/calls");
+    let lines = log.iter_slices::<String>(rerun::TextLog::descriptor_text().component);
+    let told = format!("adversary: pushes {name} with 0.060 N s; {name} topples");
+    let at: Vec<i64> =
+        lines.zip(times(log, "frame")).filter(|(row, _)| row[0].as_str() == told).map(|(_, at)| at).collect();
+    assert_eq!(at, [begin]);
 }
 
 #[test]

@@ -50,8 +50,8 @@ impl EpisodeStatistics {
         channels.chain([format!("  {}\n", list(count, "required int64 element;".to_owned()))])
     }
 
-    pub(super) fn append(&mut self, episode: &Histogram) {
-        let PictureStatistics { min, max, mean, std, count, .. } = episode.statistics();
+    pub(super) fn append(&mut self, episode: PictureStatistics) {
+        let PictureStatistics { min, max, mean, std, count, .. } = episode;
         for (column, value) in self.channels.iter_mut().zip([min, max, mean, std]) {
             column.push(value.map(|[[value]]| value));
         }

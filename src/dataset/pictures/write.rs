@@ -7,13 +7,12 @@ use crate::dataset::config::ConvertConfig;
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::{CameraInfo, FeatureInfo};
-use crate::dataset::pictures::statistics::{EpisodeStatistics, Histogram};
-use crate::dataset::pictures::video::VideoFiles;
-use crate::dataset::pictures::{PREFIX, PictureStatistics, video_columns};
+use crate::dataset::pictures::statistics::EpisodeStatistics;
+use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
 use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
 use crate::table::{ColumnKind, Value, Values};
-use crate::video::{H264Decoder, Rgb, VideoError, decode_png};
+use crate::video::VideoError;
 
 /// Bytes of pictures that make a row group, at least.
 const GROUP_BYTES: usize = 1 << 25;
@@ -33,8 +32,7 @@ struct PictureFeature {
     size_px: [u32; 2],
     store: Store,
     episodes: EpisodeStatistics,
-    histogram: Histogram,
-    decoded: Rgb,
+    measure: PictureMeasure,
 }
 
 /// Where pictures go.
@@ -57,8 +55,8 @@ impl PictureFeatures {
                 }
             };
             let (camera, size_px) = (pictures.camera.clone(), pictures.size_px);
-            let (episodes, histogram, decoded) = (EpisodeStatistics::new(&name), Histogram::default(), Rgb::default());
-            PictureFeature { name, camera, size_px, store, episodes, histogram, decoded }
+            let (episodes, measure) = (EpisodeStatistics::new(&name), PictureMeasure::new(size_px));
+            PictureFeature { name, camera, size_px, store, episodes, measure }
         };
         Self { features: cameras.iter().map(feature).collect(), fps }
     }
@@ -169,7 +167,7 @@ impl PictureFeatures {
 
     /// Statistics by feature.
     pub(in crate::dataset) fn statistics(&self) -> Vec<(String, PictureStatistics)> {
-        self.features.iter().map(|feature| (feature.name.clone(), feature.histogram.statistics())).collect()
+        self.features.iter().map(|feature| (feature.name.clone(), feature.measure.statistics())).collect()
     }
 
     /// Ends the videos. Returns their files.
@@ -207,27 +205,19 @@ impl PictureFeature {
 
     /// Adds an episode's pictures; each is decoded, for the statistics and so that none is written that is damaged.
     fn append(&mut self, rows: &[&Vec<u8>]) -> Result<(), VideoError> {
-        let (expected, mut episode) = (self.size_px, Histogram::default());
-        let mut decoder = match self.store {
-            Store::Column(_) => None,
-            Store::Videos(_) => Some(H264Decoder::new()?),
-        };
-        for row in rows {
-            match &mut decoder {
-                None => self.decoded = decode_png(row)?,
-                Some(decoder) => decoder.decode(row, &mut self.decoded)?,
-            }
-            if self.decoded.size_px != expected {
-                return Err(VideoError::Size { found: self.decoded.size_px, expected });
-            }
-            episode.add(&self.decoded);
-        }
-        self.histogram.merge(&episode);
-        self.episodes.append(&episode);
+        let mut episode = PictureMeasure::new(self.size_px);
         match &mut self.store {
-            Store::Column(column) => column.extend(rows.iter().map(|row| (*row).clone())),
-            Store::Videos(videos) => videos.append(rows)?,
+            Store::Column(column) => {
+                rows.iter().try_for_each(|row| episode.add_png(row))?;
+                column.extend(rows.iter().map(|row| (*row).clone()));
+            }
+            Store::Videos(videos) => {
+                episode.add_video(rows.iter().copied())?;
+                videos.append(rows)?;
+            }
         }
+        self.measure.merge(&episode);
+        self.episodes.append(episode.statistics());
         Ok(())
     }
 
