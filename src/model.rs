@@ -51,8 +51,11 @@ pub use config::{ModelConfig, NetworkConfig};
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
 pub use decisions::{Decisions, MAX_ARGUMENTS};
 pub use decoder::{Decoder, LabelScores, span_score};
-pub use detecting::{Detecting, Detections};
-pub use detector::{Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig};
+pub use detecting::{Detecting, Detections, detected_rows};
+pub(crate) use detector::loss as detection_loss;
+pub use detector::{
+    DetectionLoss, Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig, detector_of,
+};
 pub use encoder::{ArgumentDecoder, Encoder, Widths};
 pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened, FlattenedConfig};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};

@@ -15,8 +15,13 @@
 //!
 //! Ours, beyond the paper.
 
+mod claims;
 mod clusters;
+mod finding;
 mod foreground;
+
+pub(crate) use claims::Claims;
+pub(crate) use finding::{FIND_WIDTH, Find, Finder};
 
 use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;
@@ -71,6 +76,28 @@ impl ColourSlots {
 
     fn background(&self) -> Vec<f32> {
         self.background.val().into_data().try_into_vec().unwrap_or_default()
+    }
+
+    /// The pixels of pictures that are no background, and whose they are.
+    pub(crate) fn claims(&self, pictures: &Pictures) -> Claims {
+        let prototypes: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
+        let log_sharpness: Vec<f32> = self.log_sharpness.val().into_data().try_into_vec().unwrap_or_default();
+        let background = self.background();
+        Claims::of(pictures, &background, &foreground(pictures, &background), &prototypes, &log_sharpness)
+    }
+
+    /// The same with the colours of `slots` right behind the robot's, in this order; the others follow.
+    #[must_use]
+    pub(crate) fn with_first(mut self, slots: &[usize]) -> Self {
+        let n_colours = self.prototypes.dims()[1];
+        let others = (1..n_colours).filter(|colour| !slots.contains(colour));
+        let order: Vec<usize> = std::iter::once(0).chain(slots.iter().copied()).chain(others).collect();
+        let device = self.device();
+        let before: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
+        let columns = before.chunks_exact(n_colours).flat_map(|feature| order.iter().map(|&colour| feature[colour]));
+        let data = TensorData::new(columns.collect::<Vec<_>>(), [COLOUR_WIDTH, n_colours]);
+        self.prototypes = replaced(&self.prototypes, data, &device);
+        self
     }
 
     /// Minus the sharpened squared distance of each point's colour to each prototype, `[F, P, K]`.

@@ -56,9 +56,10 @@ impl NetworkConfig {
                 PointDetectorConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }),
                 ObjectCentricConfig::default(),
             ),
-            (_, EncoderKind::DetectedFlattened) => {
-                Self::DetectedFlattened(VggDetectorConfig { pixels: 64, narrowed: 8 }, FlattenedConfig::default())
-            }
+            (_, EncoderKind::DetectedFlattened) => Self::DetectedFlattened(
+                VggDetectorConfig { pixels: 64, narrowed: VggDetectorConfig::NARROWED },
+                FlattenedConfig::default(),
+            ),
         }
     }
 
@@ -74,9 +75,36 @@ impl NetworkConfig {
                 let perception = KeypointsConfig { pixels, slots: n_slots, ..config.perception };
                 Self::Keypoints(SightedConfig { perception, ..config })
             }
-            Self::Detected(config, widths) => Self::Detected(PointDetectorConfig { perception, ..config }, widths),
+            Self::Detected(_, widths) => Self::Detected(PointDetectorConfig::of(perception), widths),
             Self::DetectedFlattened(config, widths) => {
                 Self::DetectedFlattened(VggDetectorConfig { pixels, ..config }, widths)
+            }
+            other => other,
+        }
+    }
+
+    /// The same with another number of colours to be told apart; widths without colours stay as they are.
+    #[must_use]
+    pub fn telling_apart(self, colours: usize) -> Self {
+        match self {
+            Self::ColourSlots(config) => {
+                let perception = ColourSlotsConfig { colours, ..config.perception };
+                Self::ColourSlots(SightedConfig { perception, ..config })
+            }
+            Self::Detected(config, widths) => {
+                let perception = ColourSlotsConfig { colours, ..config.perception };
+                Self::Detected(PointDetectorConfig { perception, ..config }, widths)
+            }
+            other => other,
+        }
+    }
+
+    /// The same with VGG16's widths divided by another number; other widths stay as they are.
+    #[must_use]
+    pub fn narrowed(self, narrowed: usize) -> Self {
+        match self {
+            Self::DetectedFlattened(config, widths) => {
+                Self::DetectedFlattened(VggDetectorConfig { narrowed, ..config }, widths)
             }
             other => other,
         }

@@ -42,6 +42,11 @@ const LINEAR_GAIN: f32 = 3.0;
 /// A bump has fallen to 1/e at about the width of a block.
 const BUMP_GAIN: f32 = 8.0;
 
+/// Weights of the layer that names the argument lie within this bound to begin with: logits then differ by about one. With
+/// small ones a percept's features get no gradient before names are tied to percepts, nor names before features tell the
+/// percept that is meant: a plateau at guessing, of some hundred steps or many more.
+const NAMING_BOUND: f32 = 0.4;
+
 /// Widths of the encoder of videos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -288,7 +293,7 @@ impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
             conv: init.temporal_conv(argument_kernel, width, width),
             object: init.part(2 * width, width, 2 * width + n_context),
             context: init.linear(n_context, width),
-            slots: init.linear(P::n_percepts(&perception) * width, n_slots),
+            slots: init.linear_within(P::n_percepts(&perception) * width, n_slots, NAMING_BOUND),
         }
     }
 

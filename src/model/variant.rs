@@ -175,6 +175,11 @@ impl Variant {
         !matches!(self.encoder(), EncoderKind::ObjectCentric | EncoderKind::Flattened)
     }
 
+    /// Whether a detector is before it, which is trained first.
+    pub fn detects(self) -> bool {
+        matches!(self.encoder(), EncoderKind::Detected | EncoderKind::DetectedFlattened)
+    }
+
     /// The form of task specification that it reads, when another is asked for where it has a choice.
     pub fn specification(self, asked: SpecificationForm) -> SpecificationForm {
         if self.sees() { SpecificationForm::Video } else { asked }
