@@ -310,8 +310,7 @@ fn a_push_is_an_arrow_a_lane_and_a_line_until_all_rests() {
     let component = rerun::Arrows3D::descriptor_origins().component;
     let origins: Vec<Option<[f32; 3]>> =
         arrow.iter_slices::<[f32; 3]>(component).map(|row| row.first().copied()).collect();
-    let stood: [f32; 3] =
-        episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
+    let stood: [f32; 3] = episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
     assert_eq!(origins, [Some(stood), None]);
     let log = temporal(read.only(), "/calls");
     let lines = log.iter_slices::<String>(rerun::TextLog::descriptor_text().component);
