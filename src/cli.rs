@@ -9,7 +9,7 @@ use crate::dataset::edit::Ending;
 use crate::dataset::export::LabelForm;
 use crate::pipeline::Stage;
 use crate::program::Program;
-use crate::publish::{Date, License, Release};
+use crate::publish::{Date, License, Place, Release};
 use crate::task::{Family, Split};
 
 /// Neural Task Programming as a dataset pipeline.
@@ -63,7 +63,7 @@ pub enum Command {
     /// Make a dataset ready for others: card, Croissant, checksums, under a named licence.
     Publish(PublishArgs),
     /// Check a published copy against its SHA256SUMS.
-    Verify(PathArgs),
+    Verify(VerifyArgs),
     /// Print a completion script.
     Completions {
         /// For which shell.
@@ -150,7 +150,7 @@ pub struct PathArgs {
 /// `ntp replay`.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A recording (.mcap), or a folder of recordings or rollouts.
+    /// A recording (.mcap), a folder of recordings or rollouts, or a dataset.
     pub path: PathBuf,
     /// Which episode, by its number; several with commas.
     #[arg(long, value_name = "K", value_delimiter = ',', required = true)]
@@ -227,9 +227,9 @@ pub struct QueryArgs {
 pub struct PublishArgs {
     /// The dataset.
     pub dataset: PathBuf,
-    /// The folder to publish it into; the same command carries on what was interrupted.
-    #[arg(long, value_name = "DIR")]
-    pub to: PathBuf,
+    /// The folder to publish it into, or s3://BUCKET[/PREFIX]; the same command carries on what was interrupted.
+    #[arg(long, value_name = "DIR|URL")]
+    pub to: Place,
     /// Under which licence, by its name on the hub or at SPDX, e.g. cc-by-4.0; there is no default.
     #[arg(long, value_name = "ID")]
     pub license: License,
@@ -248,6 +248,17 @@ pub struct PublishArgs {
     /// Which release it is.
     #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
     pub release: Release,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp verify`.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// The published folder, or s3://BUCKET[/PREFIX].
+    #[arg(value_name = "DIR|URL")]
+    pub copy: Place,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! Every table's schema is in schemas/parquet. [`read_trials`] reads what a learner needs, [`validate`] checks every
-//! cross-reference, [`summarize`] says what a dataset is.
+//! cross-reference, [`summarize`] says what a dataset is, [`play_back`] reads what can be shown of an episode.
 //!
 //! # Invariants
 //!
@@ -43,6 +43,8 @@ mod info;
 mod layout;
 mod lookup;
 mod pictures;
+mod playback;
+mod program_paths;
 mod read;
 mod rolling;
 pub mod schema;
@@ -61,7 +63,8 @@ pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use lookup::{CallFacts, EpisodeFacts, FrameFacts, look_up};
-pub use pictures::EpisodePictures;
+pub use pictures::{Decoded, EpisodePictures, EpisodeRows, PictureLoader};
+pub use playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
 pub use read::read_trials;
 pub use summary::{DatasetSummary, summarize};
 pub use table_files::table_files;

@@ -2,7 +2,7 @@
 //!
 //! # Input and output
 //!
-//! [`publish`] reads a dataset that validates and writes a folder beside it:
+//! [`publish`] reads a dataset that validates and writes to a [`Destination`], a folder beside it or a place in a bucket:
 //!
 //! ```text
 //! README.md            the card: what it is, how it was made, tables, splits, limits, how to cite
@@ -18,16 +18,21 @@
 //! # Invariants
 //!
 //! The same dataset and the same words give the same bytes; the day is told, no clock is read. A publication that was
-//! killed goes on with the same command, and a file that is there already is not copied again. Nothing is overwritten.
+//! killed goes on with the same command, and a file that is there already is not copied again. Nothing is overwritten;
+//! what was written is read back.
 //! Memory grows with the number of files alone.
 
+#[cfg(feature = "cloud")]
+mod bucket;
 mod card;
 mod checksums;
 mod croissant;
 mod date;
+mod destination;
 mod error;
 mod facts;
 mod files;
+mod folder;
 mod license;
 mod provenance;
 mod publication;
@@ -40,11 +45,15 @@ use serde::Serialize;
 
 use crate::dataset::{self, Severity};
 
+#[cfg(feature = "cloud")]
+pub use bucket::Bucket;
 pub use checksums::{Difference, FileDifference, Verified, verify};
 pub use date::{Date, NoDate};
+pub use destination::{BucketUrl, Creation, Destination, NoPlace, Place};
 pub use error::PublishError;
 use facts::Facts;
 use files::Moved;
+pub use folder::Folder;
 pub use license::{License, UnknownLicense};
 pub use publication::{NoRelease, Publication, Release};
 pub use tables::meaning;
@@ -62,7 +71,7 @@ const ATTRIBUTES: (&str, &str) =
 /// What was published.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PublishSummary {
-    /// Files in the folder, `SHA256SUMS` too.
+    /// Files at the destination, `SHA256SUMS` too.
     pub files: u64,
     /// Their size in bytes, without `SHA256SUMS`.
     pub bytes: u64,
@@ -72,29 +81,31 @@ pub struct PublishSummary {
     pub kept: u64,
     /// What the check of the dataset warned of.
     pub warnings: u64,
-    /// What the folder lacks because it was not at hand; empty when it lacks nothing.
+    /// What the publication lacks because it was not at hand; empty when it lacks nothing.
     pub left_out: Vec<String>,
 }
 
-/// Publishes a dataset into a folder. `go_on` is asked before each file.
+/// Publishes a dataset. `go_on` is asked before each file.
 ///
 /// # Errors
 ///
 /// [`PublishError::Invalid`] for a dataset with faults; [`PublishError::Foreign`] and [`PublishError::Differs`] for a
-/// folder in which something else lies.
+/// destination in which something else lies; [`PublishError::NoConditionalWrites`] for a bucket that would mix two
+/// publications.
 pub fn publish(
     dataset: &Path,
-    to: &Path,
+    to: &dyn Destination,
     publication: &Publication,
     go_on: impl Fn() -> bool,
 ) -> Result<PublishSummary, PublishError> {
-    check_apart(dataset, to)?;
+    to.folder().map_or(Ok(()), |folder| check_apart(dataset, folder))?;
     let warnings = check_dataset(dataset)?;
     let facts = Facts::gather(dataset, publication)?;
     let files = files::of_dataset(dataset)?;
     let documents = documents(&facts, publication, &files)?;
     let names = files.iter().map(|file| file.path.as_str()).chain(documents.iter().map(|(name, _)| name.as_str()));
-    files::check_folder(to, &names.chain([checksums::FILE]).collect::<BTreeSet<_>>())?;
+    files::check_destination(to, &names.chain([checksums::FILE]).collect::<BTreeSet<_>>())?;
+    to.prepare()?;
     let mut moved = Moved::default();
     for file in &files {
         if !go_on() {

@@ -30,7 +30,7 @@ mod view;
 
 pub use camera::{Camera, Mount, looking_at};
 pub use config::{CameraConfig, CameraError, PictureFormat, PictureQuality, Viewpoint};
-pub use look::{Light, Look, Shadows};
+pub use look::{Letters, Light, Look, Shadows};
 pub use picture::{Picture, Segment};
 pub use randomize::Randomization;
 pub use renderer::Renderer;

@@ -26,7 +26,7 @@ mod rollouts;
 mod summary;
 mod tables;
 
-pub use claims::{Claim, Verdict};
+pub use claims::{Claim, Note, Verdict};
 pub use figures::{Figure, Grid, GridCell, PaperPoint, Point, Series};
 pub use interval::{student, wilson};
 pub use metrics::MetricsInput;
@@ -147,6 +147,7 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
         title: inputs.title.clone(),
         claims: claims::claims(&aggregates),
+        notes: claims::notes(&aggregates),
         figures: figures::figures(&aggregates),
         grids: figures::grids(&aggregates),
         aggregates,

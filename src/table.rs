@@ -14,25 +14,28 @@
 //! The same columns give the same bytes: Snappy, a fixed `created_by`, no clock. `ARROW:schema` is kept in the file,
 //! so that readers tell lists of fixed size from others.
 
+mod arrays;
 mod batches;
 mod column;
 mod encode;
 mod error;
 mod guard;
 mod kind;
+mod pictures;
 mod read;
 mod schema;
 mod values;
 mod write;
 
+pub(crate) use arrays::{FloatRows, TextRows};
 pub(crate) use batches::{BatchReader, BatchWriter};
-pub(crate) use column::FloatRows;
 pub use column::{Column, Columns};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
+pub(crate) use pictures::PictureReader;
 pub use read::{TableReader, file_columns, read};
-pub(crate) use read::{read_further, read_pictures};
+pub(crate) use read::read_further;
 pub use schema::TableSchema;
 pub(crate) use values::Values;
 pub use write::write;

@@ -198,7 +198,11 @@ pub fn train_seeing(
     let device = Device::flex().autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
     if let Some((width, height)) = gallery.map(Gallery::size) {
-        model.network = model.network.seeing(width.min(height), data.n_slots);
+        if width != height {
+            let (key, found) = ("size of the pictures", format!("{width}x{height} pixels"));
+            return Err(TrainError::Config { key, found, allowed: "as wide as high" });
+        }
+        model.network = model.network.seeing(width, data.n_slots);
     }
     let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
     with_network(&model, seed, &device, learning)
@@ -254,6 +258,11 @@ fn dataset_hash(data: &DatasetTrials) -> String {
     artifact::hex(&hasher.finalize())
 }
 
+/// What a step with this seed draws from pictures.
+fn seen_seed(step: Seed) -> Seed {
+    step.derive("seen", &[])
+}
+
 /// A training with everything settled but its network.
 struct Run<'r> {
     config: &'r TrainConfig,
@@ -303,13 +312,14 @@ impl Run<'_> {
 
     /// One step; the learner after it and the weighed loss.
     fn step<N: Network>(&self, learner: Learner<N>, standing: &mut Standing) -> Result<(Learner<N>, f32), TrainError> {
-        let step_seed = self.seed.derive("step", &[u64::from(standing.step)]);
+        let step_seed = self.step_seed(standing.step);
         let learning_rate = self.config.learning_rate_at(standing.step);
         let chosen = standing.errors.levels(self.config.curriculum, step_seed.derive("levels", &[]));
         let levels: Vec<_> = self.examples.levels().collect();
         let sizes: Vec<(usize, usize)> =
             chosen.iter().map(|&level| (level, self.batch_size(levels[level].1))).collect();
         let groups = self.draw(&sizes, step_seed)?;
+        self.announce(standing.step + 1);
         let (learner, losses) = learner.step(&groups, learning_rate);
         standing.step += 1;
         let parts: Vec<&Part> = groups.iter().flat_map(|group| &group.parts).collect();
@@ -332,13 +342,24 @@ impl Run<'_> {
     /// A step's mini-batches: of each level its size.
     fn draw(&self, sizes: &[(usize, usize)], seed: Seed) -> Result<Vec<Group>, TrainError> {
         if let Some(gallery) = self.gallery {
-            return seen::draw_seen(self.examples, gallery, self.config, sizes, seed.derive("seen", &[]));
+            return seen::draw_seen(self.examples, gallery, self.config, sizes, seen_seed(seed));
         }
         let batches = sizes.iter().enumerate().flat_map(|(batch_idx, &(level, size))| {
             let parts = draw(self.examples, self.config, level, size, seed.derive("batch", &[batch_idx as u64]));
             parts.into_iter().map(move |part| Group::from(Part { batch_idx, ..part }))
         });
         Ok(batches.collect())
+    }
+
+    /// Lets pictures be made ready for a step while the one before it is computed.
+    fn announce(&self, step: u32) {
+        if let Some(gallery) = self.gallery.filter(|_| step < self.config.n_steps()) {
+            gallery.announce(&seen::trials(self.examples, seen_seed(self.step_seed(step))));
+        }
+    }
+
+    fn step_seed(&self, step: u32) -> Seed {
+        self.seed.derive("step", &[u64::from(step)])
     }
 
     fn batch_size(&self, is_root: bool) -> usize {

@@ -12,6 +12,7 @@
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
 //! world/adversary, adversary        pushes of an adversary, where there are any: an arrow and a lane
 //! camera/{front, wrist}             what cameras see
+//! filmed/<camera>                   what the recording's own cameras saw, the first of them what a policy that sees saw
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
 //! agreement                         whether a rollout's decisions are the expert's, until the first that is not
@@ -24,6 +25,9 @@
 //!
 //! Timelines are `sim_time` (the episode's own clock) and `frame` (position among its recorded frames).
 //!
+//! An episode of a dataset (a [`Playback`]) has `programs`, `calls` and `episode` as well, `camera/<name>` for each of
+//! the dataset's cameras, and `numbers/<feature>/<dimension>`; its timelines are `timestamp` and `frame`.
+//!
 //! # Invariants
 //!
 //! The same replays give the same bytes: ids come from content, never from a clock.
@@ -34,8 +38,10 @@ mod calls;
 mod clock;
 mod gripper;
 mod lanes;
+mod layout;
 mod palette;
 mod pictures;
+mod playback;
 mod pushes;
 mod rrd;
 mod series;
@@ -50,6 +56,8 @@ use std::path::{Path, PathBuf};
 use rerun::log::ChunkError;
 
 use crate::artifact::IoError;
+use crate::dataset::Playback;
+use crate::render::CameraConfig;
 use crate::rollout::Divergence;
 use crate::trace::{Actor, Episode};
 use crate::video::VideoError;
@@ -69,11 +77,13 @@ pub struct Replay<'e> {
     pub demonstration: Option<&'e Episode>,
     /// Where a policy first left the expert's decisions; `None` when it never did, and for an expert.
     pub divergence: Option<Divergence>,
+    /// The cameras that filmed the episode. A policy that sees looked with the first of them.
+    pub cameras: &'e [CameraConfig],
 }
 
 impl<'e> From<&'e Episode> for Replay<'e> {
     fn from(episode: &'e Episode) -> Self {
-        Self { episode, demonstration: None, divergence: None }
+        Self { episode, demonstration: None, divergence: None, cameras: &[] }
     }
 }
 
@@ -195,6 +205,33 @@ pub fn spawn_replays(replays: &[Replay<'_>]) -> Result<VisualizeSummary, Visuali
     Ok(summary)
 }
 
+/// Writes episodes of datasets into an `.rrd` file, one recording each. The file is whole or not there.
+///
+/// # Errors
+///
+/// See [`VisualizeError`].
+pub fn save_playbacks(playbacks: &[Playback], path: &Path) -> Result<VisualizeSummary, VisualizeError> {
+    let mut file = RrdFile::create(path)?;
+    let summary = playback::each_store(playbacks, |store| file.append(store))?;
+    let bytes = file.finish()?;
+    Ok(VisualizeSummary { bytes, ..summary })
+}
+
+/// Shows episodes of datasets in the Rerun viewer.
+///
+/// # Errors
+///
+/// As [`spawn()`].
+pub fn spawn_playbacks(playbacks: &[Playback]) -> Result<VisualizeSummary, VisualizeError> {
+    let viewer = viewer::connect()?;
+    let summary = playback::each_store(playbacks, |store| {
+        viewer.send(store);
+        Ok(())
+    })?;
+    viewer.flush()?;
+    Ok(summary)
+}
+
 /// The name of an episode's recording, as people see it: `stack_0012/ep-000042`.
 pub fn recording_name(episode: &Episode) -> String {
     format!("{}/ep-{:06}", episode.provenance.task_id, episode.provenance.index)
@@ -224,7 +261,7 @@ fn each_store(
 }
 
 fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
-    let &Replay { episode, demonstration, divergence } = replay;
+    let &Replay { episode, demonstration, divergence, cameras: _ } = replay;
     let specification = specification_of(episode, demonstration)?;
     let mut store = Store::recording(&text::recording_id(replay));
     text::put_properties(&mut store, replay)?;
@@ -232,7 +269,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
     pushes::put(&mut store, episode)?;
-    pictures::put(&mut store, episode)?;
+    pictures::put(&mut store, replay)?;
     calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;
     if let Some(demonstration) = demonstration {

@@ -1,4 +1,4 @@
-//! `ntp publish DATASET --to DIR --license ID --date DAY`.
+//! `ntp publish DATASET --to DIR|URL --license ID --date DAY`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,7 +7,7 @@ use crate::cli::PublishArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::summarize;
-use crate::publish::{Publication, publish};
+use crate::publish::{Place, Publication, publish};
 
 pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
     let kind = Kind::of(&args.dataset)?;
@@ -16,20 +16,17 @@ pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<
         return Err(UsageError(problem).into());
     }
     let publication = publication(args)?;
-    let summary = publish(&args.dataset, &args.to, &publication, || !stop.load(Ordering::Relaxed))?;
+    let summary = publish(&args.dataset, args.to.open()?.as_ref(), &publication, || !stop.load(Ordering::Relaxed))?;
     if args.json {
         output::print_json(&summary)?;
     } else {
         output::print(&format!(
             "{} files, {} bytes, {} → {} ({} written, {} there already)",
-            summary.files,
-            summary.bytes,
-            publication.license.spdx,
-            args.to.display(),
-            summary.copied,
-            summary.kept
+            summary.files, summary.bytes, publication.license.spdx, args.to, summary.copied, summary.kept
         ))?;
-        output::note(&format!("to the Hugging Face hub: sh {}/upload.sh OWNER/NAME", args.to.display()));
+        if let Place::Folder(folder) = &args.to {
+            output::note(&format!("to the Hugging Face hub: sh {}/upload.sh OWNER/NAME", folder.display()));
+        }
     }
     if summary.warnings > 0 {
         output::note(&format!("{} warnings: ntp validate {}", summary.warnings, args.dataset.display()));

@@ -7,9 +7,12 @@ use serde_json::{Value, json};
 
 use crate::artifact::Plan;
 use crate::cli::ReplayArgs;
+use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
+use crate::dataset::{Playback, play_back};
 use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
+use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
 use crate::scene::BodyIndex;
 use crate::task::TaskSet;
@@ -24,9 +27,13 @@ struct Found {
     episode: Episode,
     demonstration: Option<Episode>,
     divergence: Option<Divergence>,
+    cameras: Vec<CameraConfig>,
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
+    if args.path.is_dir() && Kind::of(&args.path)? == Kind::Dataset {
+        return run_dataset(args);
+    }
     let mut found = find(&args.path, &args.episode)?;
     if args.verify {
         return verify(args, &found);
@@ -44,6 +51,35 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
     } else {
         let lines: Vec<String> = found.iter().map(|found| format!("{} → {place}", found.in_words())).collect();
         output::print(&lines.join("\n"))?;
+    }
+    Ok(CommandOutcome::Done)
+}
+
+/// Shows episodes of a dataset: also of one that was annotated elsewhere, of which there is no recording.
+fn run_dataset(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
+    let wrong = |problem: &str| Err(UsageError(problem.to_owned()).into());
+    if args.verify {
+        return wrong("a dataset cannot be simulated again; --verify takes the recordings that it was made of");
+    }
+    let playbacks =
+        args.episode.iter().map(|&episode| play_back(&args.path, episode)).collect::<Result<Vec<_>, _>>()?;
+    let (summary, place) = match &args.save {
+        Some(path) => (visualize::save_playbacks(&playbacks, path)?, path.display().to_string()),
+        None if args.spawn => (visualize::spawn_playbacks(&playbacks)?, "the Rerun viewer".to_owned()),
+        None => return wrong("replay of a dataset needs one of --save FILE.rrd, --spawn"),
+    };
+    let counts = |of: &Playback| (of.facts.episode_index, of.times_secs.len(), of.facts.calls.len());
+    if args.json {
+        let episodes = playbacks.iter().map(counts);
+        let episodes: Vec<Value> = episodes
+            .map(|(episode, frames, calls)| json!({ "episode": episode, "frames": frames, "calls": calls }))
+            .collect();
+        output::print_json(&json!({ "episodes": episodes, "bytes": summary.bytes, "written": place }))?;
+    } else {
+        let line = |(episode, frames, calls)| {
+            format!("episode {episode} of {} ({frames} frames, {calls} calls) → {place}", args.path.display())
+        };
+        output::print(&playbacks.iter().map(counts).map(line).collect::<Vec<String>>().join("\n"))?;
     }
     Ok(CommandOutcome::Done)
 }
@@ -66,8 +102,8 @@ fn verify(args: &ReplayArgs, found: &[Found]) -> anyhow::Result<CommandOutcome> 
 
 impl Found {
     fn replay(&self) -> Replay<'_> {
-        let Self { episode, demonstration, divergence, .. } = self;
-        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence }
+        let Self { episode, demonstration, divergence, cameras, .. } = self;
+        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence, cameras }
     }
 
     /// The frame at which a policy first left the expert's decisions, and its time.
@@ -146,10 +182,11 @@ fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
             if !(n_episodes..n_episodes + reader.n_episodes()).contains(&number) {
                 continue;
             }
-            let plan = serde_json::from_str(reader.plan_json())
+            let plan: Plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
-            let episode = reader.read_episode(number - n_episodes)?;
-            found.push(Found { number, file: file.clone(), plan, episode, demonstration: None, divergence: None });
+            let (episode, cameras) = (reader.read_episode(number - n_episodes)?, pipeline::cameras_of(&plan));
+            let (file, demonstration, divergence) = (file.clone(), None, None);
+            found.push(Found { number, file, plan, episode, demonstration, divergence, cameras });
         }
         n_episodes += reader.n_episodes();
     }

@@ -1,13 +1,11 @@
-//! `ntp verify DIR`: a published copy against its `SHA256SUMS`.
+//! `ntp verify DIR|URL`: a published copy against its `SHA256SUMS`.
 
-use anyhow::anyhow;
-
-use crate::cli::PathArgs;
+use crate::cli::VerifyArgs;
 use crate::commands::{CommandOutcome, output};
 use crate::publish::verify;
 
-pub(super) fn run(args: &PathArgs) -> anyhow::Result<CommandOutcome> {
-    let verified = verify(&args.path).map_err(|error| anyhow!("{error}; is it a published folder?"))?;
+pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<CommandOutcome> {
+    let verified = verify(args.copy.open()?.as_ref())?;
     if args.json {
         output::print_json(&verified)?;
     } else {

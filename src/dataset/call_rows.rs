@@ -1,26 +1,28 @@
 //! Reads the rows of `ntp/calls/` back into calls.
 
+use arrow::buffer::{BooleanBuffer, ScalarBuffer};
+
 use crate::dataset::DatasetError;
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::table::{Columns, TableError};
+use crate::table::{Columns, Form, TableError, TextRows};
 use crate::trace::{CallId, Instruction, ProgramCall, Span, Vocabulary};
 
 /// Columns of `ntp/calls/`.
 pub(crate) struct CallBatch {
-    episode_index: Vec<i64>,
-    call_id: Vec<i64>,
+    episode_index: ScalarBuffer<i64>,
+    call_id: ScalarBuffer<i64>,
     caller_id: Vec<Option<i64>>,
-    depth: Vec<i64>,
-    step: Vec<i64>,
-    program: Vec<String>,
+    depth: ScalarBuffer<i64>,
+    step: ScalarBuffer<i64>,
+    program: TextRows,
     argument_slot: Vec<Option<i64>>,
-    input: [Vec<i64>; 2],
+    input: [ScalarBuffer<i64>; 2],
     output: [Vec<Option<i64>>; 2],
-    frames: [Vec<i64>; 2],
-    end_of_program: Vec<bool>,
+    frames: [ScalarBuffer<i64>; 2],
+    end_of_program: BooleanBuffer,
 }
 
 impl Batch for CallBatch {
@@ -43,17 +45,17 @@ impl Batch for CallBatch {
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
-            episode_index: columns.int64("episode_index")?,
-            call_id: columns.int64("call_id")?,
+            episode_index: columns.numbers("episode_index")?,
+            call_id: columns.numbers("call_id")?,
             caller_id: columns.optional_int64("caller_id")?,
-            depth: columns.int64("depth")?,
-            step: columns.int64("step")?,
-            program: columns.text("program")?,
+            depth: columns.numbers("depth")?,
+            step: columns.numbers("step")?,
+            program: columns.text_rows("program", Form::Required)?,
             argument_slot: columns.optional_int64("argument_slot")?,
-            input: [columns.int64("input_begin")?, columns.int64("input_end")?],
+            input: [columns.numbers("input_begin")?, columns.numbers("input_end")?],
             output: [columns.optional_int64("output_begin")?, columns.optional_int64("output_end")?],
-            frames: [columns.int64("frame_begin")?, columns.int64("frame_end")?],
-            end_of_program: columns.boolean("end_of_program")?,
+            frames: [columns.numbers("frame_begin")?, columns.numbers("frame_end")?],
+            end_of_program: columns.flags("end_of_program")?,
         })
     }
 }
@@ -75,7 +77,7 @@ impl CallBatch {
             (begin, end) => return Err(format!("output begins at {begin:?} and ends at {end:?}")),
         };
         let argument = self.argument_slot[at].map(|slot| small("argument_slot", slot)).transpose()?;
-        let program: Program = self.program[at].parse().map_err(|unknown| format!("{unknown}"))?;
+        let program: Program = self.program.row(at).parse().map_err(|unknown| format!("{unknown}"))?;
         Ok(ProgramCall {
             id: CallId(small("call_id", self.call_id[at])?),
             caller: self.caller_id[at].map(|caller| small("caller_id", caller)).transpose()?.map(CallId),
@@ -86,7 +88,7 @@ impl CallBatch {
             input: span("input", self.input[0][at], self.input[1][at])?,
             output,
             frames: span("frames", self.frames[0][at], self.frames[1][at])?,
-            end_of_program: self.end_of_program[at],
+            end_of_program: self.end_of_program.value(at),
             prediction: None,
         })
     }
@@ -111,14 +113,14 @@ pub(crate) fn read_calls(
 
 /// The instructions in `ntp/calls/`.
 pub(crate) struct InstructionBatch {
-    instruction: Vec<Option<String>>,
+    instruction: TextRows,
 }
 
 impl Batch for InstructionBatch {
     const COLUMNS: &'static [&'static str] = &["instruction"];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { instruction: columns.optional_text("instruction")? })
+        Ok(Self { instruction: columns.text_rows("instruction", Form::Optional)? })
     }
 }
 
@@ -131,7 +133,7 @@ pub(crate) fn read_instructions(
     let mut instructions = Vec::new();
     for call in 0..row.n_calls {
         let (batch, at) = cursor.next(row.calls)?;
-        let words = batch.instruction[at].as_ref().map(|sentence| vocabulary.words(sentence)).transpose();
+        let words = batch.instruction.get(at).map(|sentence| vocabulary.words(sentence)).transpose();
         match words {
             Ok(words) => instructions.extend(words.map(|words| Instruction { call: CallId(call as u32), words })),
             Err(unknown) => return Err(cursor.problem(unknown.to_string())),

@@ -1,5 +1,6 @@
 //! Reads the rows of a table in many files one after another, and knows where each one is.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::dataset::DatasetError;
@@ -13,6 +14,28 @@ pub(crate) trait Batch: Sized {
 
     /// Takes the columns.
     fn take(columns: &mut Columns) -> Result<Self, TableError>;
+}
+
+/// Rows of a batch, one after another.
+pub(crate) struct Rows<'c, B> {
+    cursor: &'c Cursor<B>,
+    pub(crate) batch: &'c B,
+    /// Which rows of the batch.
+    pub(crate) range: Range<usize>,
+}
+
+impl<B: Batch> Rows<'_, B> {
+    /// The path of their file.
+    pub(crate) fn path(&self) -> PathBuf {
+        self.cursor.path()
+    }
+
+    /// Names one of the rows by its place in the batch.
+    pub(crate) fn problem(&self, at: usize, problem: String) -> DatasetError {
+        let after = self.range.end.saturating_sub(at + 1) as u64;
+        let row = self.cursor.row().saturating_sub(after);
+        DatasetError::Row { path: self.path(), row, problem }
+    }
 }
 
 /// A place among the rows of the files of one folder.
@@ -51,6 +74,19 @@ impl<B: Batch> Cursor<B> {
         row.ok_or_else(|| self.count("it ends before the rows that it should have"))
     }
 
+    /// Reads the next rows, at most `n_rows` and at least one, as [`Cursor::next`] does: those that lie in one batch.
+    pub(crate) fn next_rows(&mut self, place: FilePlace, n_rows: usize) -> Result<Rows<'_, B>, DatasetError> {
+        let (_, begin) = self.next(place)?;
+        let n_further = match &mut self.open {
+            Some(open) => open.advance_in_batch(n_rows.saturating_sub(1))?,
+            None => 0,
+        };
+        let cursor = &*self;
+        let batch = cursor.open.as_ref().and_then(|open| Some(&open.batch.as_ref()?.0));
+        let batch = batch.ok_or_else(|| cursor.count("it ends before the rows that it should have"))?;
+        Ok(Rows { cursor, batch, range: begin..begin + n_further + 1 })
+    }
+
     /// Reads the next row, of the file that is open or, when it has ended, of the one after it.
     pub(crate) fn next_in_order(&mut self) -> Result<(&B, usize), DatasetError> {
         let place = match &self.open {
@@ -85,8 +121,12 @@ impl<B: Batch> Cursor<B> {
 
     /// Names the row that was read last.
     pub(crate) fn problem(&self, problem: String) -> DatasetError {
-        let row = self.open.as_ref().and_then(|open| open.row).unwrap_or(0);
-        DatasetError::Row { path: self.path(), row, problem }
+        DatasetError::Row { path: self.path(), row: self.row(), problem }
+    }
+
+    /// The number of the row that was read last, in its file.
+    fn row(&self) -> u64 {
+        self.open.as_ref().and_then(|open| open.row).unwrap_or(0)
     }
 
     fn open_file(&self, place: FilePlace) -> Result<OpenFile<B>, DatasetError> {
@@ -109,6 +149,20 @@ impl<B: Batch> OpenFile<B> {
             self.check_end()?;
         }
         Ok(true)
+    }
+
+    /// Steps over rows of the batch, at most as many as there are; gives how many.
+    fn advance_in_batch(&mut self, n_rows: usize) -> Result<usize, DatasetError> {
+        let Some(row) = self.row else { return Ok(0) };
+        let in_batch = self.batch.as_ref().map_or(0, |(_, n_rows)| n_rows.saturating_sub(self.at + 1));
+        let in_file = self.reader.n_rows().saturating_sub(row + 1);
+        let n_further = n_rows.min(in_batch).min(usize::try_from(in_file).unwrap_or(usize::MAX));
+        self.at += n_further;
+        self.row = Some(row + n_further as u64);
+        if n_further > 0 && !self.has_more() {
+            self.check_end()?;
+        }
+        Ok(n_further)
     }
 
     /// Makes sure that nothing follows the last row: what is broken there is broken for readers of whole files.

@@ -3,8 +3,9 @@
 //! # Input and output
 //!
 //! [`merge`], [`filter`] and [`split`] read whole datasets episode by episode and write a new folder, which appears
-//! whole or not at all; [`repair`] does so with what can be read of a broken one. Rows of every table are carried over as Arrow batches, whatever columns they have; indices,
-//! places, task and sub-task texts and statistics are made anew. [`diff`] says what differs between two.
+//! whole or not at all; [`repair`] does so with what can be read of a broken one. Rows of every table are carried over as
+//! Arrow batches, whatever columns they have, and the samples of videos as they are; indices, places, task and sub-task
+//! texts and statistics are made anew. [`diff`] says what differs between two.
 //!
 //! # Errors
 //!
@@ -12,7 +13,7 @@
 //!
 //! # Invariants
 //!
-//! Memory holds some thousand rows of each table, whatever the number of episodes; and an entry for each recording and
+//! Memory holds some thousand rows of each table and one video file, whatever the number of episodes; and an entry for each recording and
 //! distinct task. The same sources and settings give the same bytes. Sources are never written to.
 
 mod condition;
@@ -20,11 +21,13 @@ mod cursor;
 mod diff;
 mod error;
 mod fit;
-mod numbers;
+pub(super) mod numbers;
+mod pictures;
 mod pieces;
 mod renumber;
 mod repair;
 mod rolling;
+mod samples;
 mod source;
 mod split;
 mod target;

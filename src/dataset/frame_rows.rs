@@ -1,5 +1,7 @@
 //! Reads the rows of `data/` back.
 
+use arrow::buffer::{BooleanBuffer, ScalarBuffer};
+
 use crate::dataset::DatasetError;
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
@@ -8,10 +10,10 @@ use crate::table::{Columns, FloatRows, TableError};
 /// The columns of `data/` that a learner of programs needs.
 pub(crate) struct FrameBatch {
     pub(crate) state: FloatRows,
-    pub(crate) frame_index: Vec<i64>,
-    pub(crate) episode_index: Vec<i64>,
-    pub(crate) index: Vec<i64>,
-    pub(crate) boundary: Vec<bool>,
+    pub(crate) frame_index: ScalarBuffer<i64>,
+    pub(crate) episode_index: ScalarBuffer<i64>,
+    pub(crate) index: ScalarBuffer<i64>,
+    pub(crate) boundary: BooleanBuffer,
 }
 
 impl Batch for FrameBatch {
@@ -21,10 +23,10 @@ impl Batch for FrameBatch {
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
             state: columns.float_rows("observation.state")?,
-            frame_index: columns.int64("frame_index")?,
-            episode_index: columns.int64("episode_index")?,
-            index: columns.int64("index")?,
-            boundary: columns.boolean("ntp.boundary")?,
+            frame_index: columns.numbers("frame_index")?,
+            episode_index: columns.numbers("episode_index")?,
+            index: columns.numbers("index")?,
+            boundary: columns.flags("ntp.boundary")?,
         })
     }
 }
@@ -64,8 +66,9 @@ pub(crate) fn read_frames(
         if let Some(problem) = batch.problem(at, row, frame, width) {
             return Err(cursor.problem(problem));
         }
-        frames.is_boundary.push(batch.boundary[at]);
-        if batch.boundary[at] {
+        let is_boundary = batch.boundary.value(at);
+        frames.is_boundary.push(is_boundary);
+        if is_boundary {
             frames.observations.extend_from_slice(batch.state.row(at));
         }
     }

@@ -4,8 +4,8 @@
 
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
+use crate::dataset::program_paths::ProgramPaths;
 use crate::dataset::text::{TextTable, subtask_text};
-use crate::program::Program;
 use crate::table::{Values, WriteOptions};
 use crate::trace::{Frame, Observation};
 
@@ -39,7 +39,7 @@ pub(crate) struct FrameRows {
     gripper: Vec<f32>,
     call_id: Vec<i64>,
     program: Vec<u32>,
-    paths: Paths,
+    paths: ProgramPaths,
     subtasks: TextTable,
 }
 
@@ -63,7 +63,7 @@ impl FrameRows {
             gripper: Vec::new(),
             call_id: Vec::new(),
             program: Vec::new(),
-            paths: Paths::default(),
+            paths: ProgramPaths::default(),
             subtasks: TextTable::default(),
         }
     }
@@ -131,22 +131,16 @@ impl FrameRows {
         let first = self.call_id.len();
         let calls = &view.episode.calls;
         let root = calls[0].program;
-        let root_path = self.paths.root(root);
+        self.paths.note(calls);
         let root_text = i64::from(self.subtasks.key(root.name()));
         self.call_id.resize(first + view.n_rows(), 0);
-        self.program.resize(first + view.n_rows(), root_path);
+        self.program.resize(first + view.n_rows(), self.paths.key(0));
         self.subtask_index.resize(first + view.n_rows(), root_text);
-        self.paths.of_call.clear();
         for (position, (call, spans)) in calls.iter().zip(view.spans).enumerate() {
-            let path = match call.caller {
-                None => root_path,
-                Some(caller) => self.paths.callee(self.paths.of_call[caller.0 as usize], call.program),
-            };
-            self.paths.of_call.push(path);
             let rows = first + spans.frames.begin as usize..first + spans.frames.last() as usize;
             if call.depth > 0 && !rows.is_empty() {
                 self.call_id[rows.clone()].fill(position as i64);
-                self.program[rows.clone()].fill(path);
+                self.program[rows.clone()].fill(self.paths.key(position));
             }
             if call.depth == 1 && !rows.is_empty() {
                 let name = |slot: usize| view.episode.scene.slots[slot].name.as_str();
@@ -174,7 +168,7 @@ impl FrameRows {
             Values::Int64(&self.recording_frame),
             Values::Float32Vector(&self.gripper, POSITION_WIDTH),
             Values::Int64(&self.call_id),
-            Values::Word(&self.program, self.paths.texts.texts()),
+            Values::Word(&self.program, self.paths.texts()),
         ];
         std::array::from_fn(|at| (FEATURES[at].name, columns[at]))
     }
@@ -201,31 +195,4 @@ fn append_state(flat: &mut Vec<f32>, frame: &Frame) {
     }
     let closed = f32::from(u8::from(frame.state.held.is_some()));
     flat.extend_from_slice(&[1.0 - closed, closed]);
-}
-
-/// Stacks of running programs, as texts `block_stacking/pick_and_place/pick`.
-#[derive(Default)]
-struct Paths {
-    texts: TextTable,
-    /// By the key of the caller's path, the keys of the paths of what it calls.
-    callees: Vec<[Option<u32>; Program::ALL.len()]>,
-    of_call: Vec<u32>,
-}
-
-impl Paths {
-    fn root(&mut self, program: Program) -> u32 {
-        self.texts.key(program.name())
-    }
-
-    fn callee(&mut self, caller: u32, program: Program) -> u32 {
-        let caller = caller as usize;
-        if self.callees.len() <= caller {
-            self.callees.resize(caller + 1, [None; Program::ALL.len()]);
-        }
-        let known = &mut self.callees[caller][program.index()];
-        *known.get_or_insert_with(|| {
-            let path = format!("{}/{program}", self.texts.texts()[caller]);
-            self.texts.key(&path)
-        })
-    }
 }

@@ -78,6 +78,11 @@ impl CameraInfo {
         let (codec, pix_fmt) = ("h264".to_owned(), "yuv420p".to_owned());
         Self { height, width, codec, pix_fmt, is_depth_map: false, fps, channels: 3, has_audio: false }
     }
+
+    /// What its pictures are encoded by.
+    pub(crate) fn codec(&self) -> &str {
+        &self.codec
+    }
 }
 
 /// Others also give names as a map of lists, which say nothing that is needed here.

@@ -3,13 +3,20 @@
 //! A camera's pictures are the feature `observation.images.NAME`: PNG in a column of `data/` (`struct<bytes, path>`), or
 //! H.264 in `videos/FEATURE/chunk-000/file-000.mp4`, whose samples are copied from the recordings.
 
+mod loader;
+mod measure;
+mod open_files;
+mod places;
 mod read;
 mod statistics;
 mod video;
 mod write;
 
+pub use loader::{Decoded, EpisodeRows, PictureLoader};
+pub(super) use measure::PictureMeasure;
 pub use read::EpisodePictures;
 pub(crate) use statistics::PictureStatistics;
+pub(super) use video::VideoFiles;
 pub(super) use write::PictureFeatures;
 
 use crate::table::{ColumnKind, Form, Value};
@@ -18,7 +25,7 @@ use crate::table::{ColumnKind, Form, Value};
 pub(super) const PREFIX: &str = "observation.images.";
 
 /// Columns of `meta/episodes/` about a video: where an episode's pictures are.
-fn video_columns(feature: &str) -> [(String, ColumnKind); 4] {
+pub(super) fn video_columns(feature: &str) -> [(String, ColumnKind); 4] {
     let kind = |value| ColumnKind { value, form: Form::Required };
     let named = |name: &str, value| (format!("videos/{feature}/{name}"), kind(value));
     [

@@ -19,7 +19,8 @@ use crate::artifact::IoError;
 use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::table::Values;
 
-use number::{copy_keys, copy_values, key_of};
+pub(in crate::dataset) use number::copy_values;
+use number::{copy_keys, key_of};
 use quantile::Selector;
 use spool::Spool;
 

@@ -74,6 +74,17 @@ impl NetworkConfig {
         }
     }
 
+    /// Width and height of the pictures that the network is made for; `None` where it sees none.
+    pub fn pixels(&self) -> Option<usize> {
+        match self {
+            Self::ObjectCentric(_) | Self::Flattened(_) | Self::Instructed(_) => None,
+            Self::ColourSlots(config) => Some(config.perception.pixels),
+            Self::Convolved(config) => Some(config.pixels),
+            Self::Detected(config, _) => Some(config.perception.pixels),
+            Self::DetectedFlattened(config, _) => Some(config.pixels),
+        }
+    }
+
     /// What the network reads as task specification.
     pub fn specification(&self) -> SpecificationForm {
         match self {

@@ -9,6 +9,7 @@ use crate::model;
 use crate::pipeline::costs::Costs;
 use crate::pipeline::runner::{Context, Options, Part, Unit};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout, tasks, train};
+use crate::render::{CameraConfig, Randomization};
 use crate::report::{self, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values};
 use crate::task::Split;
 use crate::training::METRICS_FILE;
@@ -150,12 +151,29 @@ fn facts(context: &Context<'_>) -> Result<Vec<Fact>, PipelineError> {
     let recordings = context.dir.recordings().finished()?;
     let dataset = context.dir.dataset().finished()?;
     let fact = |name: &str, value: String| Fact { experiment: spec.name.clone(), name: name.to_owned(), value };
-    Ok(vec![
+    let mut facts = vec![
         fact("run seed", spec.seed.to_string()),
         fact("task family", spec.tasks.family.name().to_owned()),
         fact("training tasks", task_set.of_split(Split::Seen).count().to_string()),
         fact("unseen tasks", task_set.of_split(Split::Unseen).count().to_string()),
         fact("expert demonstrations", format!("{}, {} failed", recordings.episodes, recordings.failed)),
         fact("episodes in the dataset", dataset.episodes.to_string()),
-    ])
+    ];
+    facts.extend(spec.generate.cameras.iter().map(|camera| fact(&format!("camera {}", camera.name), seen(camera))));
+    Ok(facts)
+}
+
+/// What a camera's pictures are, in words.
+fn seen(camera: &CameraConfig) -> String {
+    let CameraConfig { size_px: [width, height], randomize, .. } = camera;
+    let Randomization { light, color, camera_m, camera_rad, one_color } = randomize;
+    let mut words = format!("{width} x {height} pixels");
+    let shares = [("light", light, ""), ("colours", color, ""), ("place", camera_m, " m"), ("angle", camera_rad, " rad")];
+    for (what, most, unit) in shares.into_iter().filter(|(_, most, _)| **most > 0.0) {
+        words.push_str(&format!(", {what} changed by up to {most}{unit}"));
+    }
+    if *one_color {
+        words.push_str(", one colour for all that moves");
+    }
+    words
 }

@@ -48,6 +48,7 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
                 "suite": suite_spec,
                 "decoder": actor.map(|actor| actor.decoder),
                 "record": spec.rollout.record,
+                "cameras": spec.generate.cameras,
                 "decisions_factor": spec.rollout.decisions_factor,
                 "simulation": spec.generate.simulation,
             });
@@ -156,12 +157,16 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
 }
 
 impl Learned {
-    /// Refuses a model that was made for another family, another number of slots, or as another variant.
+    /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
+    /// another variant.
     fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
         let found = load_config(&self.folder)?;
         let family = context.pipeline.spec.tasks.family;
-        let wanted =
+        let mut wanted =
             ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
+        if let Some(camera) = context.pipeline.spec.generate.cameras.first() {
+            wanted.network = wanted.network.seeing(camera.size_px[0] as usize, wanted.n_slots);
+        }
         check_purpose(&found, &wanted, &self.folder)?;
         Ok(load_policy(&self.folder, self.decoder)?.1)
     }
@@ -275,7 +280,16 @@ impl Suite<'_> {
     fn sight(&self, demonstration: &Episode, world: &Simulation, seed: Seed) -> Result<Option<Sight>, PipelineError> {
         let sees = self.learned.as_ref().is_some_and(|learned| learned.variant.sees());
         let camera = self.context.pipeline.spec.generate.cameras.first().filter(|_| sees);
-        camera.map(|camera| sight(camera, demonstration, world.scene(), seed)).transpose()
+        let look = |camera| {
+            sight(camera, demonstration, world.scene(), seed).map_err(|source| PipelineError::Sight {
+                suite: self.spec.name.clone(),
+                episode: demonstration.provenance.index,
+                task_id: demonstration.provenance.task_id.clone(),
+                camera: camera.name.clone(),
+                source,
+            })
+        };
+        camera.map(look).transpose()
     }
 
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
@@ -310,7 +324,8 @@ impl Suite<'_> {
         }
         let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", self.unit.plan.shards);
         let plan_json = serde_json::to_string(&self.unit.plan).unwrap_or_default();
-        let mut writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
+        let writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
+        let mut writer = writer.with_cameras(&self.context.pipeline.spec.generate.cameras);
         for rollout in acted.iter().take(n_recorded as usize) {
             writer.write(&rollout.episode)?;
         }

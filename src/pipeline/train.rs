@@ -45,6 +45,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let Part::Model { model, seed } = unit.part else { return Ok(()) };
     let spec = &context.pipeline.spec.models[model];
     let trials = training_trials(context, spec)?;
+    let gallery = spec.variant.sees().then(|| gallery::open(context, &trials)).transpose()?;
     unit.dir.begin(&unit.plan)?;
     let training = spec.training(seed).resolved();
     let progress = context.progress(unit, u64::from(training.config.n_steps()), "steps");
@@ -55,7 +56,6 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         progress.message(&format!("loss {:.3}", now.loss));
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
-    let gallery = spec.variant.sees().then(|| gallery::read(context, &trials)).transpose()?;
     let gallery = gallery.as_ref().map(|gallery| gallery as &dyn Gallery);
     let summary = training::train_seeing(&training, &trials, gallery, unit.dir.path(), &mut hooks);
     context.go_on()?;

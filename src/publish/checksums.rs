@@ -1,11 +1,13 @@
-//! `SHA256SUMS`: written last, so that a folder that has one is whole; read to check a copy.
+//! `SHA256SUMS`: written last, so that a copy that has one is whole; read to check it.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 use serde::Serialize;
 
-use crate::artifact::{FileEntry, IoError, PARTIAL_PREFIX, read, sha256_file};
+use crate::artifact::FileEntry;
+use crate::publish::PublishError;
+use crate::publish::destination::Destination;
 
 /// Name of the file.
 pub(super) const FILE: &str = "SHA256SUMS";
@@ -69,9 +71,9 @@ pub(super) fn render(files: &[FileEntry]) -> String {
 ///
 /// # Errors
 ///
-/// When there is no `SHA256SUMS`, or a folder cannot be listed.
-pub fn verify(copy: &Path) -> Result<Verified, IoError> {
-    let text = read(&copy.join(FILE))?;
+/// [`PublishError::Unpublished`] when there is no `SHA256SUMS`; when the files cannot be listed.
+pub fn verify(copy: &dyn Destination) -> Result<Verified, PublishError> {
+    let text = copy.read(FILE)?.ok_or_else(|| PublishError::Unpublished { path: copy.path(FILE) })?;
     let mut expected = BTreeMap::new();
     let mut verified = Verified::default();
     for line in String::from_utf8_lossy(&text).lines() {
@@ -93,7 +95,7 @@ pub fn verify(copy: &Path) -> Result<Verified, IoError> {
             detail,
         }));
     }
-    for path in files_below(copy)? {
+    for path in copy.list()? {
         if path != FILE && !expected.contains_key(&path) {
             let detail = String::new();
             verified.differences.push(FileDifference { path, difference: Difference::Extra, detail });
@@ -110,39 +112,11 @@ fn parse(line: &str) -> Option<(&str, &str)> {
     (is_hash && is_inside).then_some((sha256, path))
 }
 
-fn check(copy: &Path, path: &str, expected: &str) -> Option<(Difference, String)> {
-    let file = copy.join(path);
-    if !file.is_file() {
-        return Some((Difference::Missing, String::new()));
-    }
-    match sha256_file(&file) {
-        Ok(found) if found.eq_ignore_ascii_case(expected) => None,
-        Ok(found) => Some((Difference::Changed, format!("sha256 is {found}, but should be {expected}"))),
+fn check(copy: &dyn Destination, path: &str, expected: &str) -> Option<(Difference, String)> {
+    match copy.sha256(path) {
+        Ok(None) => Some((Difference::Missing, String::new())),
+        Ok(Some(found)) if found.eq_ignore_ascii_case(expected) => None,
+        Ok(Some(found)) => Some((Difference::Changed, format!("sha256 is {found}, but should be {expected}"))),
         Err(error) => Some((Difference::Unreadable, error.to_string())),
     }
-}
-
-/// Every file below a folder, relative to it with `/`, in order; without a `.git` folder and unfinished files.
-pub(super) fn files_below(root: &Path) -> Result<Vec<String>, IoError> {
-    let mut files = Vec::new();
-    let mut folders: Vec<PathBuf> = vec![root.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).map_err(IoError::system("list", &folder))? {
-            let entry = entry.map_err(IoError::system("list", &folder))?;
-            let (path, name) = (entry.path(), entry.file_name());
-            let is_partial = name.to_string_lossy().starts_with(PARTIAL_PREFIX);
-            if is_partial || (name == ".git" && folder == root) {
-                continue;
-            }
-            // A link counts as a file: what it leads to is no part of the folder.
-            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                folders.push(path);
-            } else if let Ok(relative) = path.strip_prefix(root) {
-                let parts: Vec<_> = relative.iter().map(|part| part.to_string_lossy()).collect();
-                files.push(parts.join("/"));
-            }
-        }
-    }
-    files.sort();
-    Ok(files)
 }

@@ -20,13 +20,13 @@ pub enum PublishError {
         /// The first finding.
         first: Box<Finding>,
     },
-    /// Something else lies in the folder.
+    /// Something else lies at the destination.
     #[error("{} is no part of this publication; publish into a folder of its own", path.display())]
     Foreign {
         /// What lies there.
         path: PathBuf,
     },
-    /// A file of another publication lies in the folder.
+    /// A file of another publication lies at the destination.
     #[error(
         "{} has other content than this publication gives it; nothing is overwritten: remove the folder or choose \
          another",
@@ -61,6 +61,37 @@ pub enum PublishError {
         document: &'static str,
         /// What the renderer said.
         problem: String,
+    },
+    /// Nothing is published there, or not all of it.
+    #[error("{} is not there: nothing was published here, or not to its end", path.display())]
+    Unpublished {
+        /// The checksums that are missing.
+        path: PathBuf,
+    },
+    /// A bucket cannot be reached by this program.
+    #[error("{url}: this program was built without buckets; build it with: cargo build --release --features cloud")]
+    NoCloud {
+        /// The bucket.
+        url: String,
+    },
+    /// A bucket whose store passes over conditions: two publications could mix in it.
+    #[error(
+        "{url}: its store does not keep to conditional writes (If-None-Match), so that two publications could mix; \
+         publish into a folder and copy that"
+    )]
+    NoConditionalWrites {
+        /// The bucket.
+        url: String,
+    },
+    /// A store refuses, or cannot be reached.
+    #[error("failed to {action} {}: {source}", place.display())]
+    Store {
+        /// What was tried.
+        action: &'static str,
+        /// With which object.
+        place: PathBuf,
+        /// What the store said.
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The user pressed Ctrl-C; the same command goes on.
     #[error("interrupted; the same command carries on")]

@@ -2,7 +2,7 @@
 
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
-use crate::report::claims::{Claim, Verdict};
+use crate::report::claims::{Claim, Note, Verdict};
 use crate::report::summary::{Aggregate, FirstError, Report};
 use crate::report::tables::{self, ModelRow};
 
@@ -36,6 +36,10 @@ pub(super) fn render(report: &Report) -> String {
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
     put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
     put(&MODEL_COLUMNS, tables::models(&report.models).iter().map(model).collect());
+    if !report.notes.is_empty() {
+        text.push('\n');
+        report.notes.iter().for_each(|said| text.push_str(&note(said)));
+    }
     text
 }
 
@@ -103,6 +107,13 @@ fn claim(claim: &Claim) -> Vec<String> {
         _ => format!("**{}**", claim.verdict.words()),
     };
     vec![claim.claim.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
+}
+
+fn note(note: &Note) -> String {
+    match note.variant.as_str() {
+        "" => format!("- {}\n", note.text),
+        variant => format!("- `{variant}`: {}\n", note.text),
+    }
 }
 
 /// What made the figures: program, commit, seeds, cost.

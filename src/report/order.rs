@@ -8,7 +8,18 @@ use crate::task::Family;
 use crate::trace::SpecificationForm;
 
 /// Variants from the paper's model to its ancestor; the oracle stands last.
-const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru", "npi", "oracle"];
+const VARIANTS: [&str; 10] = [
+    "ntp",
+    "ntp_gru",
+    "ntp_no_scope",
+    "flat",
+    "flat_gru",
+    "npi",
+    "ntp_vid_e2e",
+    "ntp_vid_e2e_general",
+    "ntp_vid_detector",
+    "oracle",
+];
 
 /// Decoders, the one that stands for its model where only one can be shown first.
 pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::PaperValue;
-use crate::report::claims::Claim;
+use crate::report::claims::{Claim, Note};
 use crate::report::figures::{Figure, Grid};
 use crate::trace::SpecificationForm;
 
@@ -32,6 +32,8 @@ pub struct Report {
     pub aggregates: Vec<Aggregate>,
     /// What the paper claims, judged by these results.
     pub claims: Vec<Claim>,
+    /// What is to be said of variants that see beside their figures.
+    pub notes: Vec<Note>,
     /// The paper's figures from these results.
     pub figures: Vec<Figure>,
     /// Table Clean-up by bowls and forks.

@@ -1,6 +1,7 @@
 //! Tables as Arrow batches, every column of them: for what is carried from file to file as it is.
 
 use std::fs::File;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,6 +17,8 @@ use crate::table::schema::ParsedSchema;
 use crate::table::write::{WriteOptions, properties};
 use crate::table::{ColumnKind, TableError};
 
+type FileReaderBuilder = ParquetRecordBatchReaderBuilder<File>;
+
 /// Reads every column of a file.
 pub(crate) struct BatchReader {
     path: PathBuf,
@@ -26,11 +29,23 @@ pub(crate) struct BatchReader {
 impl BatchReader {
     /// Opens a file, to be read in batches of so many rows.
     pub(crate) fn open(path: &Path, batch_rows: usize) -> Result<Self, TableError> {
+        Self::open_with(path, |builder| builder.with_batch_size(batch_rows))
+    }
+
+    /// Opens some rows of a file, to be read as one batch or several.
+    pub(crate) fn open_rows(path: &Path, rows: Range<usize>) -> Result<Self, TableError> {
+        Self::open_with(path, |builder| builder.with_offset(rows.start).with_limit(rows.len()))
+    }
+
+    fn open_with(
+        path: &Path,
+        settings: impl FnOnce(FileReaderBuilder) -> FileReaderBuilder,
+    ) -> Result<Self, TableError> {
         guarded(path, || {
             let file = File::open(path).map_err(IoError::system("open", path))?;
-            let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(TableError::parquet(path))?;
+            let builder = FileReaderBuilder::try_new(file).map_err(TableError::parquet(path))?;
             let schema = Arc::clone(builder.schema());
-            let reader = builder.with_batch_size(batch_rows).build().map_err(TableError::parquet(path))?;
+            let reader = settings(builder).build().map_err(TableError::parquet(path))?;
             Ok(Self { path: path.to_owned(), schema, reader })
         })
     }

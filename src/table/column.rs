@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use arrow::array::{Array as _, ArrayRef};
+
+use crate::table::arrays::append_array;
 use crate::table::{ColumnKind, Form, TableError, Value};
 
 /// The values of one column, a row each.
@@ -40,7 +43,7 @@ impl Column {
             (Form::Required, Value::Text) => Self::Text(Vec::new()),
             (Form::Optional, Value::Text) => Self::OptionalText(Vec::new()),
             (Form::List, Value::Text) => Self::TextList(Vec::new()),
-            (Form::Optional | Form::List, Value::Boolean) | (_, Value::Picture) => return None,
+            (Form::Optional | Form::List, Value::Boolean) | (_, Value::Picture | Value::Channels) => return None,
         })
     }
 
@@ -89,47 +92,14 @@ impl Column {
     }
 }
 
-/// Lists of floats one after another: without an allocation a row.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct FloatRows {
-    values: Vec<f32>,
-    /// Of each row, one past its last value.
-    ends: Vec<usize>,
-}
-
-impl FloatRows {
-    /// From all values and the borders between rows, which begin with that of the first row.
-    pub(crate) fn new(values: &[f32], borders: &[i32]) -> Self {
-        let first = borders.first().map_or(0, |&border| border as usize);
-        let ends: Vec<usize> = borders.iter().skip(1).map(|&border| border as usize - first).collect();
-        let n_values = ends.last().copied().unwrap_or(0);
-        Self { values: values[first..first + n_values].to_vec(), ends }
-    }
-
-    /// How many rows.
-    pub(crate) fn len(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// The values of a row.
-    pub(crate) fn row(&self, at: usize) -> &[f32] {
-        let begin = if at == 0 { 0 } else { self.ends[at - 1] };
-        &self.values[begin..self.ends[at]]
-    }
-
-    fn to_lists(&self) -> Vec<Vec<f32>> {
-        (0..self.len()).map(|at| self.row(at).to_vec()).collect()
-    }
-}
-
 /// Columns by name, all of one length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
     path: PathBuf,
     schema: &'static str,
     columns: Vec<(String, Column)>,
-    /// Lists of floats, where they were read in batches.
-    float_rows: Vec<(String, FloatRows)>,
+    /// Those of a batch, as they lie in it until they are taken.
+    arrays: Vec<(String, ColumnKind, ArrayRef)>,
 }
 
 macro_rules! takers {
@@ -171,37 +141,26 @@ takers! {
 
 impl Columns {
     pub(crate) fn new(path: &Path, schema: &'static str, columns: Vec<(String, Column)>) -> Self {
-        Self { path: path.to_owned(), schema, columns, float_rows: Vec::new() }
+        Self { path: path.to_owned(), schema, columns, arrays: Vec::new() }
     }
 
-    pub(crate) fn with_float_rows(self, float_rows: Vec<(String, FloatRows)>) -> Self {
-        Self { float_rows, ..self }
-    }
-
-    /// Takes lists of floats out as they were read.
-    ///
-    /// # Errors
-    ///
-    /// When there is no such column.
-    pub(crate) fn float_rows(&mut self, name: &str) -> Result<FloatRows, TableError> {
-        match self.float_rows.iter().position(|(column, _)| column == name) {
-            Some(position) => Ok(self.float_rows.remove(position).1),
-            None => Err(self.missing(name, Column::Float32List(Vec::new()).kind())),
-        }
+    /// Those of a batch, without nulls where there must be none.
+    pub(super) fn of_batch(path: &Path, schema: &'static str, arrays: Vec<(String, ColumnKind, ArrayRef)>) -> Self {
+        Self { path: path.to_owned(), schema, columns: Vec::new(), arrays }
     }
 
     /// How many rows.
     pub fn n_rows(&self) -> usize {
-        let of_rows = || self.float_rows.first().map_or(0, |(_, rows)| rows.len());
-        self.columns.first().map_or_else(of_rows, |(_, column)| column.len())
+        let of_arrays = || self.arrays.first().map_or(0, |(_, _, array)| array.len());
+        self.columns.first().map_or_else(of_arrays, |(_, column)| column.len())
     }
 
-    /// A column by name.
+    /// A column by name, of a table that was read whole.
     pub fn get(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|(column, _)| column == name).map(|(_, column)| column)
     }
 
-    /// The columns that have not been taken, in the schema's order.
+    /// The columns that have not been taken, in the schema's order, of a table that was read whole.
     pub fn into_inner(self) -> Vec<(String, Column)> {
         self.columns
     }
@@ -210,10 +169,25 @@ impl Columns {
         if let Some(position) = self.columns.iter().position(|(column, _)| column == name) {
             return Ok(self.columns.remove(position).1);
         }
-        match self.float_rows.iter().position(|(column, _)| column == name) {
-            Some(position) => Ok(Column::Float32List(self.float_rows.remove(position).1.to_lists())),
-            None => Err(self.missing(name, expected)),
-        }
+        let copy = |kind: ColumnKind, array: &ArrayRef| {
+            let mut column = Column::empty(kind)?;
+            append_array(&mut column, array)?;
+            Some(column)
+        };
+        self.take_array(name, expected, copy)
+    }
+
+    /// Takes a column of a batch out, as what `of` makes of it.
+    pub(super) fn take_array<T>(
+        &mut self,
+        name: &str,
+        expected: ColumnKind,
+        of: impl FnOnce(ColumnKind, &ArrayRef) -> Option<T>,
+    ) -> Result<T, TableError> {
+        let position = self.arrays.iter().position(|(column, ..)| column == name);
+        let position = position.ok_or_else(|| self.missing(name, expected))?;
+        let (_, kind, array) = self.arrays.remove(position);
+        of(kind, &array).ok_or_else(|| self.wrong_kind(name, expected, kind))
     }
 
     fn missing(&self, name: &str, expected: ColumnKind) -> TableError {

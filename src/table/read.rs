@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
-use arrow::datatypes::{ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -13,11 +12,10 @@ use parquet::arrow::arrow_reader::{
 use parquet::file::metadata::ParquetMetaData;
 
 use crate::artifact::IoError;
+use crate::table::arrays::append_array;
 use crate::table::guard::guarded;
-use crate::table::{Column, ColumnKind, Columns, FloatRows, Form, TableError, TableSchema, Value};
+use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
 
-/// What is read without an allocation a row.
-const FLOAT_LIST: ColumnKind = ColumnKind { value: Value::Float32, form: Form::List };
 /// Rows of one batch.
 const BATCH_ROWS: usize = 8192;
 
@@ -49,41 +47,6 @@ pub(crate) fn read_further(
     let mut columns = reader.empty_columns();
     while reader.append_batch(&mut columns)? {}
     Ok(Columns::new(path, schema.name(), columns))
-}
-
-/// Reads the encoded pictures of some rows.
-///
-/// # Errors
-///
-/// As [`read`]; when there are fewer rows, or a row has no picture.
-pub(crate) fn read_pictures(
-    path: &Path,
-    schema: &TableSchema,
-    name: &str,
-    rows: std::ops::Range<usize>,
-) -> Result<Vec<Vec<u8>>, TableError> {
-    guarded(path, || {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder =
-            ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
-        let kind = ColumnKind { value: Value::Picture, form: Form::Required };
-        let roots = find_roots(path, schema.name(), &[(name.to_owned(), kind)], builder.metadata())?;
-        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-        let builder = builder.with_projection(mask).with_offset(rows.start).with_limit(rows.len());
-        let mut pictures = Vec::with_capacity(rows.len());
-        for batch in builder.build().map_err(TableError::parquet(path))? {
-            let batch = batch.map_err(TableError::arrow(path))?;
-            let column = batch.column(0).as_struct_opt().and_then(|fields| fields.column_by_name("bytes"));
-            let bytes = column.and_then(|column| column.as_binary_opt::<i32>());
-            pictures.extend(bytes.into_iter().flatten().flatten().map(<[u8]>::to_vec));
-        }
-        if pictures.len() == rows.len() {
-            return Ok(pictures);
-        }
-        let (column, row) = (name.to_owned(), (rows.start + pictures.len()) as u64);
-        Err(TableError::Null { path: path.to_owned(), schema: schema.name(), column, row })
-    })
 }
 
 /// Reads a table in batches of some thousand rows.
@@ -173,16 +136,6 @@ impl TableReader {
         append_array(column, array).ok_or_else(|| self.wrong(name, column.kind(), array.data_type().to_string()))
     }
 
-    /// Lists of floats of a batch, as they lie in it.
-    fn float_rows(&self, name: &str, batch: &RecordBatch, first_row: u64) -> Result<FloatRows, TableError> {
-        let array = self.array(name, FLOAT_LIST, batch, first_row)?;
-        let rows = || {
-            let list = array.as_list_opt::<i32>()?;
-            Some(FloatRows::new(list.values().as_primitive_opt::<Float32Type>()?.values(), list.offsets()))
-        };
-        rows().ok_or_else(|| self.wrong(name, FLOAT_LIST, array.data_type().to_string()))
-    }
-
     /// A column of a batch, without nulls where there must be none.
     fn array<'b>(
         &self,
@@ -217,16 +170,11 @@ impl TableReader {
     fn next_columns(&mut self) -> Result<Option<Columns>, TableError> {
         let first_row = self.rows_read;
         let Some(batch) = self.next_batch()? else { return Ok(None) };
-        let (mut columns, mut float_rows) = (Vec::new(), Vec::new());
-        for (name, kind) in &self.columns {
-            if *kind == FLOAT_LIST {
-                float_rows.push((name.clone(), self.float_rows(name, &batch, first_row)?));
-            } else if let Some(mut column) = Column::empty(*kind) {
-                self.append(name, &mut column, &batch, first_row)?;
-                columns.push((name.clone(), column));
-            }
-        }
-        Ok(Some(Columns::new(&self.path, self.schema, columns).with_float_rows(float_rows)))
+        let array = |(name, kind): &(String, ColumnKind)| {
+            Ok((name.clone(), *kind, ArrayRef::clone(self.array(name, *kind, &batch, first_row)?)))
+        };
+        let arrays = self.columns.iter().map(array).collect::<Result<_, TableError>>()?;
+        Ok(Some(Columns::of_batch(&self.path, self.schema, arrays)))
     }
 }
 
@@ -254,7 +202,7 @@ pub fn file_columns(path: &Path) -> Result<Vec<(String, Option<ColumnKind>)>, Ta
 }
 
 /// Positions of the wanted columns among the file's.
-fn find_roots(
+pub(super) fn find_roots(
     path: &Path,
     schema: &'static str,
     columns: &[(String, ColumnKind)],
@@ -299,39 +247,4 @@ fn first_null(array: &ArrayRef, expected: ColumnKind) -> Option<usize> {
             list.offsets().windows(2).position(|ends| (ends[0]..ends[1]).contains(&(value as i32)))
         }),
     }
-}
-
-fn append_array(column: &mut Column, array: &ArrayRef) -> Option<()> {
-    match column {
-        Column::Int64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Int64Type>()?.values()),
-        Column::OptionalInt64(rows) => rows.extend(array.as_primitive_opt::<Int64Type>()?),
-        Column::Float32(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float32Type>()?.values()),
-        Column::OptionalFloat32(rows) => rows.extend(array.as_primitive_opt::<Float32Type>()?),
-        Column::Float64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float64Type>()?.values()),
-        Column::OptionalFloat64(rows) => rows.extend(array.as_primitive_opt::<Float64Type>()?),
-        Column::Boolean(rows) => rows.extend(array.as_boolean_opt()?.values()),
-        Column::Text(rows) => {
-            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.unwrap_or_default().to_owned()));
-        }
-        Column::OptionalText(rows) => {
-            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.map(ToOwned::to_owned)));
-        }
-        Column::Int64List(rows) => append_list::<Int64Type>(rows, array)?,
-        Column::Float32List(rows) => append_list::<Float32Type>(rows, array)?,
-        Column::Float64List(rows) => append_list::<Float64Type>(rows, array)?,
-        Column::TextList(rows) => {
-            let list = array.as_list_opt::<i32>()?;
-            let values = list.values().as_string_opt::<i32>()?;
-            let row = |ends: &[i32]| (ends[0]..ends[1]).map(|at| values.value(at as usize).to_owned()).collect();
-            rows.extend(list.offsets().windows(2).map(row));
-        }
-    }
-    Some(())
-}
-
-fn append_list<T: ArrowPrimitiveType>(rows: &mut Vec<Vec<T::Native>>, array: &ArrayRef) -> Option<()> {
-    let list = array.as_list_opt::<i32>()?;
-    let values = list.values().as_primitive_opt::<T>()?.values();
-    rows.extend(list.offsets().windows(2).map(|ends| values[ends[0] as usize..ends[1] as usize].to_vec()));
-    Some(())
 }

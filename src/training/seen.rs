@@ -36,6 +36,29 @@ pub trait Gallery: Sync {
     ///
     /// When one cannot be read; says which and why.
     fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String>;
+
+    /// Told which trials the next step will look at, so that their pictures can be made ready meanwhile.
+    fn announce(&self, trials: &[usize]) {
+        let _nothing_to_do = trials;
+    }
+}
+
+/// The trials that a step with this seed looks at, each once.
+pub(super) fn trials(examples: &Examples<'_>, seed: Seed) -> Vec<usize> {
+    let groups = (0..GROUPS).flat_map(|group| draw_pairs(examples, &mut group_seed(seed, group).rng()));
+    let mut trials: Vec<usize> = groups.flatten().collect();
+    trials.sort_unstable();
+    trials.dedup();
+    trials
+}
+
+fn group_seed(seed: Seed, group: usize) -> Seed {
+    seed.derive("group", &[group as u64])
+}
+
+/// The first that is drawn for a group: whatever else is, these are the trials that it looks at.
+fn draw_pairs(examples: &Examples<'_>, rng: &mut impl Rng) -> Vec<[usize; 2]> {
+    (0..TASKS_OF_GROUP).map(|_| examples.draw_pair(rng)).collect()
 }
 
 /// Draws a step's mini-batches, one of each of `levels`. It depends on nothing but its arguments.
@@ -47,7 +70,7 @@ pub(super) fn draw_seen(
     seed: Seed,
 ) -> Result<Vec<Group>, TrainError> {
     let mut drawn: Vec<Vec<Vec<Example>>> = (0..GROUPS)
-        .map(|group| draw_group(examples, config, sizes, &mut seed.derive("group", &[group as u64]).rng()))
+        .map(|group| draw_group(examples, config, sizes, &mut group_seed(seed, group).rng()))
         .collect();
     let mut groups: Vec<Shown> = drawn.iter().map(|group| Shown::new(group.iter().flatten())).collect();
     let mut parts: Vec<Group> =
@@ -78,7 +101,7 @@ fn draw_group(
     sizes: &[(usize, usize)],
     rng: &mut impl Rng,
 ) -> Vec<Vec<Example>> {
-    let pairs: Vec<[usize; 2]> = (0..TASKS_OF_GROUP).map(|_| examples.draw_pair(rng)).collect();
+    let pairs = draw_pairs(examples, rng);
     let decision = |level_idx: usize, rng: &mut _| {
         (0..DRAWS).find_map(|_| {
             let [a, b] = pairs[Rng::random_range(rng, 0..pairs.len())];

@@ -138,9 +138,25 @@ impl Mp4Reader {
         &self.samples
     }
 
+    /// One of them.
+    ///
+    /// # Errors
+    ///
+    /// When there are not so many.
+    pub fn sample(&self, position: usize) -> Result<Mp4Sample, VideoError> {
+        let count = self.samples.len();
+        let sample = self.samples.get(position);
+        sample.copied().ok_or_else(|| container(&self.path, &format!("no picture {position} of {count}")))
+    }
+
     /// Width and height of the pictures.
     pub fn size_px(&self) -> [u32; 2] {
         self.size_px
+    }
+
+    /// What a decoder must know before the first picture, in Annex B.
+    pub fn parameter_sets(&self) -> &[u8] {
+        &self.parameter_sets
     }
 
     /// A sample as a packet in Annex B, which takes the place of what is in `packet`.
@@ -149,9 +165,7 @@ impl Mp4Reader {
     ///
     /// When there is no such sample, or it is damaged.
     pub fn read(&mut self, position: usize, packet: &mut Vec<u8>) -> Result<(), VideoError> {
-        let count = self.samples.len();
-        let sample = self.samples.get(position);
-        let sample = *sample.ok_or_else(|| container(&self.path, &format!("no picture {position} of {count}")))?;
+        let sample = self.sample(position)?;
         let mut bytes = vec![0; sample.len as usize];
         let io = |action| IoError::system(action, &self.path);
         self.file.seek(SeekFrom::Start(sample.offset)).map_err(io("read"))?;

@@ -9,6 +9,9 @@ pub(super) const SIM_TIME: &str = "sim_time";
 /// Position among the recorded frames, from 0.
 pub(super) const FRAME: &str = "frame";
 
+/// Time since the episode began, as a dataset gives it.
+pub(super) const TIMESTAMP: &str = "timestamp";
+
 /// Both timelines at some frames, given by position.
 pub(super) fn times(frames: &[Frame], positions: &[usize]) -> [TimeColumn; 2] {
     let nanos = positions.iter().map(|&position| frames[position].time_nanos as i64);

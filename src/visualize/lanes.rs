@@ -1,6 +1,7 @@
 //! The stack of running programs over time: one lane a depth.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use rerun::external::re_log_types::EntityPath;
 use rerun::{StateChange, StateConfiguration};
@@ -37,17 +38,27 @@ pub(super) fn events<'c>(
     frames: &[Frame],
     calls: impl IntoIterator<Item = &'c ProgramCall>,
 ) -> Vec<(usize, Option<&'c ProgramCall>)> {
-    let mut events: BTreeMap<usize, Option<&ProgramCall>> = BTreeMap::new();
-    for call in calls {
+    let running = calls.into_iter().map(|call| {
         let begin = call.frames.begin as usize;
-        events.split_off(&begin);
-        events.insert(begin, Some(call));
-        let end = (call.frames.last() as usize).max(begin + 1);
-        if end < frames.len() {
-            events.insert(end, None);
+        (call, begin..(call.frames.last() as usize).max(begin + 1))
+    });
+    changes(frames.len(), running)
+}
+
+/// At which of the frames what begins to run; `None` where nothing runs any longer.
+pub(super) fn changes<C: Copy>(
+    n_frames: usize,
+    running: impl IntoIterator<Item = (C, Range<usize>)>,
+) -> Vec<(usize, Option<C>)> {
+    let mut changes: BTreeMap<usize, Option<C>> = BTreeMap::new();
+    for (call, Range { start, end }) in running.into_iter().filter(|(_, running)| running.start < n_frames) {
+        changes.split_off(&start);
+        changes.insert(start, Some(call));
+        if end < n_frames {
+            changes.insert(end, None);
         }
     }
-    events.into_iter().collect()
+    changes.into_iter().collect()
 }
 
 /// Logs one lane a depth below `root`.

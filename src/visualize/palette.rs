@@ -1,6 +1,7 @@
 //! Colours: each program has one, wherever it is shown.
 
 use rerun::Color;
+use sha2::{Digest as _, Sha256};
 
 use crate::program::Program;
 use crate::scene::Scene;
@@ -22,6 +23,18 @@ pub(super) const BACKGROUND: [u8; 3] = [58, 64, 72];
 pub(super) const START: [u8; 3] = [102, 205, 120];
 /// Of the probability that a scope ends at a frame.
 pub(super) const STOP: [u8; 3] = [240, 98, 98];
+
+/// Of programs that are not of our vocabulary.
+const OTHERS: [[u8; 3]; 8] = [
+    [84, 110, 168],
+    [126, 87, 194],
+    [38, 150, 140],
+    [205, 133, 63],
+    [79, 165, 235],
+    [92, 170, 96],
+    [214, 84, 120],
+    [190, 180, 80],
+];
 
 /// Opaque.
 pub(super) fn color([red, green, blue]: [u8; 3]) -> Color {
@@ -54,6 +67,15 @@ fn of_program(program: Program) -> [u8; 3] {
         Program::Grip => [92, 170, 96],
         Program::Release => [214, 84, 120],
     }
+}
+
+/// The colour of a program of any vocabulary, by its name.
+pub(super) fn of_name(name: &str) -> [u8; 3] {
+    if let Ok(program) = name.parse::<Program>() {
+        return of_program(program);
+    }
+    let digest = Sha256::digest(name.as_bytes());
+    OTHERS[usize::from(digest[0]) % OTHERS.len()]
 }
 
 /// Depths, told apart in plots.

@@ -19,6 +19,9 @@ pub(super) fn recording_id(replay: &Replay<'_>) -> String {
     for episode in [Some(replay.episode), replay.demonstration].into_iter().flatten() {
         hash(&mut hasher, episode);
     }
+    for camera in replay.cameras {
+        hasher.update(format!("{camera:?}"));
+    }
     let digest = hex(&hasher.finalize()[..6]);
     format!("{}-ep-{:06}-{digest}", replay.episode.provenance.task_id, replay.episode.provenance.index)
 }

@@ -2,6 +2,7 @@
 import itertools
 import json
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import mlcroissant
@@ -12,6 +13,7 @@ dataset = mlcroissant.Dataset(jsonld=root / "croissant.json")
 issues = dataset.metadata.ctx.issues
 assert not issues.errors, issues.report()
 declared = json.loads((root / "croissant.json").read_text())
+told = []
 for record_set in declared["recordSet"]:
     name = record_set["name"]
     if name == "splits":
@@ -25,6 +27,7 @@ for record_set in declared["recordSet"]:
     records = list(itertools.islice(dataset.records(name), wanted))
     assert len(records) == wanted, (name, len(records), wanted)
     assert len(records[0]) == len(record_set["field"]), (name, records[0].keys())
-    print(f"mlcroissant: {name}: {len(records)} of {rows} records of {len(record_set['field'])} fields")
-warnings = issues.report() if issues.warnings else "no warnings"
-print(f"mlcroissant: {declared['name']!r} validates, {warnings}")
+    told.append(f"{wanted} of {rows} {name}" if wanted < rows else f"{rows} {name}")
+if issues.warnings:
+    told.append(issues.report())
+print(f"mlcroissant {version('mlcroissant')}: validates, opened, {', '.join(told)}")

@@ -7,9 +7,7 @@ import duckdb
 import polars
 import pyarrow.parquet
 
-root = Path(sys.argv[1])
-info = json.loads((root / "meta/info.json").read_text())
-tables = {
+TABLES = {
     "frames": "data/*/*.parquet",
     "episodes (LeRobot)": "meta/episodes/*/*.parquet",
     "tasks": "meta/tasks.parquet",
@@ -18,19 +16,31 @@ tables = {
     "calls": "ntp/calls/*/*.parquet",
     "scopes": "ntp/scopes/*/*.parquet",
 }
-counts = {}
-for name, pattern in tables.items():
-    files = sorted(root.glob(pattern))
-    assert files, f"no file {pattern}"
-    by_arrow = sum(pyarrow.parquet.read_table(file).num_rows for file in files)
-    by_polars = sum(polars.read_parquet(file).height for file in files)
-    by_duckdb = duckdb.sql(f"select count(*) from read_parquet('{root / pattern}')").fetchall()[0][0]
-    assert by_arrow == by_polars == by_duckdb, (name, by_arrow, by_polars, by_duckdb)
-    counts[name] = by_arrow
-    print(f"pyarrow, polars, duckdb: {name}: {by_arrow} rows")
-assert counts["frames"] == info["total_frames"], (counts["frames"], info["total_frames"])
-assert counts["episodes"] == counts["episodes (LeRobot)"] == info["total_episodes"]
+READERS = {
+    "pyarrow": (pyarrow, lambda files: sum(pyarrow.parquet.read_table(file).num_rows for file in files)),
+    "Polars": (polars, lambda files: sum(polars.read_parquet(file).height for file in files)),
+    "DuckDB": (duckdb, lambda files: duckdb.read_parquet([str(file) for file in files]).fetchnumpy().popitem()[1].size),
+}
+
+root = Path(sys.argv[1])
+info, own = (json.loads((root / name).read_text()) for name in ["meta/info.json", "ntp/info.json"])
+expected = {
+    "frames": info["total_frames"],
+    "episodes (LeRobot)": info["total_episodes"],
+    "tasks": info["total_tasks"],
+    "episodes": info["total_episodes"],
+    "calls": own["total_calls"],
+    "scopes": own["total_scopes"],
+}
+for reader, (module, count) in READERS.items():
+    counts = {}
+    for name, pattern in TABLES.items():
+        files = sorted(root.glob(pattern))
+        assert files, f"no file {pattern}"
+        counts[name] = count(files)
+    assert counts | expected == counts, (reader, counts, expected)
+    told = ", ".join(f"{counts[name]} {name}" for name in ["episodes", "frames", "calls", "scopes", "tasks"])
+    print(f"{reader} {module.__version__}: opened, {told}")
 # What LeRobot does: the task's text is the pandas index, and its row is its number.
 tasks = pyarrow.parquet.read_table(root / "meta/tasks.parquet").to_pandas()
 assert tasks.iloc[0].name == tasks.index[0] and isinstance(tasks.index[0], str), tasks.head()
-print(f"pandas: {len(tasks)} task texts, the first is {tasks.index[0]!r}")

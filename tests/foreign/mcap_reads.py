@@ -2,11 +2,12 @@
 
 Usage: python tests/foreign/mcap_reads.py FILE.mcap
 Needs: pip install mcap mcap-protobuf-support
-Prints a line a topic; exits with an error when a message cannot be decoded or an episode is not whole.
+Prints one line; exits with an error when a message cannot be decoded or an episode is not whole.
 """
 
 import collections
 import sys
+from importlib.metadata import version
 
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -14,7 +15,6 @@ from mcap_protobuf.decoder import DecoderFactory
 
 def main(path: str) -> None:
     counts = collections.Counter()
-    schemas = {}
     last_time = 0
     episodes = []
     with open(path, "rb") as file:
@@ -26,12 +26,12 @@ def main(path: str) -> None:
             assert message.log_time >= last_time, f"time goes back on {channel.topic}"
             last_time = message.log_time
             counts[channel.topic] += 1
-            schemas[channel.topic] = schema.name
             check(channel.topic, decoded, episodes)
     assert sum(counts.values()) == statistics.message_count
-    for topic in sorted(counts):
-        print(f"{topic}: {counts[topic]} of {schemas[topic]}")
-    print(f"{len(episodes)} episodes, {last_time / 1e9:.3f} s, metadata {metadata}, attachments {attachments}")
+    assert metadata and attachments, "a recording says what it is"
+    frames, calls = (sum(episode[name] for episode in episodes) for name in ["frames", "calls"])
+    told = f"{len(episodes)} episodes, {frames} frames, {calls} calls, {sum(counts.values())} messages"
+    print(f"mcap {version('mcap')}: opened, {told} of {len(counts)} topics, {last_time / 1e9:.0f} s")
 
 
 def check(topic: str, message, episodes: list) -> None:

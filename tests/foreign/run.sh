@@ -1,24 +1,36 @@
 #!/usr/bin/env bash
-# Opens a run directory's files with other programs' readers: run.sh RUN_DIR WORK_DIR
+# Opens a run directory's files with other programs' readers, one line each: run.sh RUN_DIR WORK_DIR
+# LEROBOT=1 asks for LeRobot and lerobot-doctor too, which install PyTorch (some 6 GB) and need Python 3.12.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-run=$1
-work=$2
-mkdir -p "$work"
+run=$(cd "$1" && pwd)
+mkdir -p "$2"
+work=$(cd "$2" && pwd)
+cd "$here/../.."
 venv="${XDG_CACHE_HOME:-$HOME/.cache}/ntp/foreign-venv"
-if [ ! -x "$venv/bin/python" ]; then python3 -m venv "$venv"; fi
+if [ ! -x "$venv/bin/python" ]; then "${PYTHON:-python3}" -m venv "$venv"; fi
 "$venv/bin/pip" install --quiet --disable-pip-version-check mcap mcap-protobuf-support pyarrow pandas polars duckdb mlcroissant==1.1.1 datasets rerun-sdk==0.36.3
+ntp() { cargo run --quiet --release -- "$@"; }
 
 for recording in "$run"/recordings/*.mcap; do
     "$venv/bin/python" "$here/mcap_reads.py" "$recording"
     break
 done
 "$venv/bin/python" "$here/dataset_reads.py" "$run/dataset"
-cargo run --quiet --release -- replay "$run/recordings" --episode 0 --save "$work/episode.rrd"
-"$venv/bin/rerun" rrd verify "$work/episode.rrd"
-"$venv/bin/rerun" rrd stats "$work/episode.rrd" > "$work/stats.txt"
-echo "rerun: accepts episode.rrd"
-cargo run --quiet --release -- publish "$run/dataset" --to "$work/published" --license cc-by-4.0 --date 2026-01-01
+NTP_DATASET="$run/dataset" cargo test --quiet --release --test it reruns_reader_opens_the_dataset_that_is_named -- --nocapture | grep '^re_lerobot'
+ntp replay "$run/recordings" --episode 0,1,2 --save "$work/episodes.rrd" > "$work/replay.txt"
+ntp replay "$run/dataset" --episode 0 --save "$work/dataset.rrd" >> "$work/replay.txt"
+for file in episodes dataset; do
+    "$venv/bin/rerun" rrd verify "$work/$file.rrd" > "$work/verify.txt" 2>&1
+    "$venv/bin/rerun" rrd stats "$work/$file.rrd" > "$work/$file-stats.txt" 2>&1
+done
+"$venv/bin/python" "$here/rrd_reads.py" "$work/episodes.rrd" "$work/replay.txt"
+rm -rf "$work/published"
+ntp publish "$run/dataset" --to "$work/published" --license cc-by-4.0 --date 2026-01-01 > "$work/publish.txt" 2>&1
 (cd "$work/published" && sha256sum --quiet -c SHA256SUMS)
-"$venv/bin/python" "$here/croissant_reads.py" "$work/published"
-"$venv/bin/python" "$here/configs_read.py" "$work/published"
+"$venv/bin/python" "$here/croissant_reads.py" "$work/published" 2> "$work/croissant.txt"
+"$venv/bin/python" "$here/configs_read.py" "$work/published" 2> "$work/configs.txt"
+if [ "${LEROBOT:-0}" = 1 ]; then
+    "$here/lerobot.sh" "$run/dataset"
+    "$here/lerobot.sh" "$work/published"
+fi

@@ -35,7 +35,7 @@ const ORDER: &[&str] = &[
 ];
 
 /// Crates that only these modules may use.
-const OWNERS: [(&str, &[&str]); 7] = [
+const OWNERS: [(&str, &[&str]); 9] = [
     ("rapier3d", &["sim"]),
     ("burn", &["model", "training", "rollout/learned"]),
     ("mcap", &["recording"]),
@@ -43,6 +43,8 @@ const OWNERS: [(&str, &[&str]); 7] = [
     ("polars", &["report", "query"]),
     ("arrow", &["table", "dataset"]),
     ("parquet", &["table", "dataset"]),
+    ("object_store", &["publish/bucket"]),
+    ("tokio", &["publish/bucket"]),
 ];
 
 fn source_files() -> Vec<(String, String)> {

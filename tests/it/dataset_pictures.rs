@@ -2,21 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
+use ntp::dataset::edit::{Condition, SplitBy, diff, filter, merge, repair, split};
 use ntp::dataset::{ConvertConfig, EpisodePictures, FrameChoice, RecordingEpisodes, convert, read_trials, validate};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{CameraConfig, PictureFormat, Renderer, Viewpoint};
 use ntp::seed::Seed;
+use ntp::task::Split;
 use ntp::trace::Episode;
+use ntp::video::{Mp4Reader, Rgb};
 use re_lerobot::EpisodeIndex;
 use re_lerobot::datasetv3::LeRobotDatasetV3;
 
 use crate::dataset::{densify, episodes};
 
 /// The feature of each camera, and how far a value may be off on average.
-const CAMERAS: [(&str, PictureFormat, f64); 2] =
+pub(crate) const CAMERAS: [(&str, PictureFormat, f64); 2] =
     [("front", PictureFormat::Png, 0.0), ("wrist", PictureFormat::H264, 8.0)];
 
-fn cameras() -> Vec<CameraConfig> {
+pub(crate) fn cameras() -> Vec<CameraConfig> {
     let of = |(name, format, _): (&str, PictureFormat, f64)| {
         let view = if name == "front" { Viewpoint::Front } else { Viewpoint::Wrist };
         CameraConfig { format, ..CameraConfig::new(view, [64, 48]) }
@@ -24,39 +27,53 @@ fn cameras() -> Vec<CameraConfig> {
     CAMERAS.into_iter().map(of).collect()
 }
 
-struct Made {
+pub(crate) struct Made {
     _folder: tempfile::TempDir,
-    root: PathBuf,
-    episodes: Vec<Episode>,
+    pub(crate) root: PathBuf,
+    pub(crate) episodes: Vec<Episode>,
 }
 
-/// Episodes with two frames between boundaries, filmed, recorded and converted.
-fn made(frames: FrameChoice) -> Made {
-    let folder = tempfile::tempdir().unwrap();
-    let episodes: Vec<Episode> = episodes().iter().map(|episode| densify(episode, 2)).collect();
-    let path = folder.path().join("shard.mcap");
-    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&cameras());
-    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
-    writer.finish().unwrap();
+/// Episodes with two frames between boundaries.
+fn dense() -> Vec<Episode> {
+    episodes().iter().map(|episode| densify(episode, 2)).collect()
+}
+
+/// Episodes, filmed, recorded and converted.
+pub(crate) fn made(frames: FrameChoice) -> Made {
+    let (folder, episodes) = (tempfile::tempdir().unwrap(), dense());
+    let path = film(folder.path(), "shard", &episodes, &cameras());
     let root = folder.path().join("dataset");
-    convert_to(&path, frames, &root);
+    convert_to(&[&path], frames, &root);
     Made { _folder: folder, root, episodes }
 }
 
-fn convert_to(path: &Path, frames: FrameChoice, root: &Path) {
+/// A recording of episodes.
+fn film(folder: &Path, name: &str, episodes: &[Episode], cameras: &[CameraConfig]) -> PathBuf {
+    let path = folder.join(format!("{name}.mcap"));
+    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(cameras);
+    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
+    writer.finish().unwrap();
+    path
+}
+
+fn convert_to(paths: &[&Path], frames: FrameChoice, root: &Path) {
     let config = ConvertConfig { frames, ..ConvertConfig::default() };
-    let reader = ShardReader::open(path).unwrap();
-    let file = || ("shard.mcap".to_owned(), "0".repeat(64));
+    let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
+    let sha256 = |path: &Path| ntp::artifact::sha256_bytes(name(path).as_bytes());
+    let readers = paths.iter().map(|path| (name(path), sha256(path), ShardReader::open(path).unwrap()));
     match frames {
         FrameChoice::All => {
-            let (file, sha256) = file();
-            let recording = RecordingEpisodes { file, sha256, episodes: reader.pictured() };
-            convert([Ok::<_, RecordingError>(recording)], &config, root).unwrap();
+            let recordings = readers.map(|(file, sha256, reader)| {
+                Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes: reader.pictured() })
+            });
+            convert(recordings, &config, root).unwrap();
         }
         FrameChoice::Boundaries => {
-            let (file, sha256) = file();
-            let recording = RecordingEpisodes { file, sha256, episodes: reader.boundaries().pictured() };
-            convert([Ok::<_, RecordingError>(recording)], &config, root).unwrap();
+            let recordings = readers.map(|(file, sha256, reader)| {
+                let episodes = reader.boundaries().pictured();
+                Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes })
+            });
+            convert(recordings, &config, root).unwrap();
         }
     }
 }
@@ -120,9 +137,11 @@ fn reruns_reader_opens_images_and_videos() {
 #[test]
 fn the_same_recordings_give_the_same_videos() {
     let [a, b] = [made(FrameChoice::All), made(FrameChoice::All)];
-    let video =
-        |made: &Made| std::fs::read(made.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4")).unwrap();
-    assert_eq!(video(&a), video(&b));
+    assert_eq!(video(&a.root), video(&b.root));
+}
+
+fn video(root: &Path) -> Vec<u8> {
+    std::fs::read(root.join("videos/observation.images.wrist/chunk-000/file-000.mp4")).unwrap()
 }
 
 #[test]
@@ -139,4 +158,165 @@ fn a_damaged_video_and_a_missing_one_are_found() {
     assert!(codes(&made.root).iter().any(|code| code == "pictures.decode"));
     std::fs::remove_file(&path).unwrap();
     assert!(!codes(&made.root).is_empty());
+}
+
+/// The datasets `a` of the first episodes, `b` of the others, and `whole` of all, each episode with its pictures.
+fn parts(frames: FrameChoice) -> (tempfile::TempDir, [PathBuf; 3]) {
+    let (folder, episodes) = (tempfile::tempdir().unwrap(), dense());
+    let a = film(folder.path(), "first", &episodes[..2], &cameras());
+    let b = film(folder.path(), "second", &episodes[2..], &cameras());
+    let roots = ["a", "b", "whole"].map(|name| folder.path().join(name));
+    convert_to(&[&a], frames, &roots[0]);
+    convert_to(&[&b], frames, &roots[1]);
+    convert_to(&[&a, &b], frames, &roots[2]);
+    (folder, roots)
+}
+
+/// The pictures of each episode of a camera.
+fn all_pictures(root: &Path, camera: &str) -> Vec<Vec<Rgb>> {
+    let mut pictures = EpisodePictures::open(root, camera).unwrap();
+    (0..pictures.n_episodes()).map(|episode| pictures.read(episode).unwrap()).collect()
+}
+
+#[track_caller]
+fn assert_opens_in_rerun(root: &Path) {
+    let opened = LeRobotDatasetV3::load_from_directory(root).unwrap();
+    for (position, pictures) in all_pictures(root, "front").into_iter().enumerate() {
+        let rows = opened.read_episode_data(EpisodeIndex(position)).unwrap();
+        assert_eq!(rows.num_rows(), pictures.len(), "episode {position}");
+        assert!(rows.column_by_name("observation.images.front").is_some());
+        let video = opened.read_episode_video_contents("observation.images.wrist", EpisodeIndex(position)).unwrap();
+        assert_eq!(&video[4..8], b"ftyp");
+    }
+}
+
+#[test]
+fn merged_datasets_have_the_pictures_and_statistics_of_one_converted_at_once() {
+    for frames in [FrameChoice::Boundaries, FrameChoice::All] {
+        let (folder, [a, b, whole]) = parts(frames);
+        let merged = folder.path().join("merged");
+        let summary = merge(&[a, b], &merged).unwrap();
+        assert!(summary.files.iter().any(|file| file.ends_with(".mp4")));
+        assert_eq!(validate(&merged).findings, []);
+        for (camera, ..) in CAMERAS {
+            assert_eq!(all_pictures(&merged, camera), all_pictures(&whole, camera));
+        }
+        assert!(video(&merged) == video(&whole));
+        assert!(diff(&merged, &whole).unwrap().is_none());
+        for file in ["meta/stats.json", "meta/info.json"] {
+            let [found, expected] = [&merged, &whole].map(|root| std::fs::read_to_string(root.join(file)).unwrap());
+            assert_eq!(found, expected, "{file}");
+        }
+        assert_opens_in_rerun(&merged);
+    }
+}
+
+#[test]
+fn a_filtered_dataset_has_the_pictures_of_its_episodes_alone() {
+    let made = made(FrameChoice::Boundaries);
+    let unseen: Vec<usize> = (0..made.episodes.len())
+        .filter(|&position| made.episodes[position].provenance.split == Split::Unseen)
+        .collect();
+    assert!(unseen[0] > 0 && unseen.len() > 1);
+    let folder = tempfile::tempdir().unwrap();
+    let (filtered, alone) = (folder.path().join("filtered"), folder.path().join("alone"));
+    filter(&made.root, &Condition { split: Some(Split::Unseen), ..Condition::default() }, &filtered).unwrap();
+    let wanted: Vec<Episode> = unseen.iter().map(|&position| made.episodes[position].clone()).collect();
+    convert_to(&[&film(folder.path(), "shard", &wanted, &cameras())], FrameChoice::Boundaries, &alone);
+    assert_eq!(validate(&filtered).findings, []);
+    for (camera, ..) in CAMERAS {
+        let all = all_pictures(&made.root, camera);
+        let expected: Vec<_> = unseen.iter().map(|&position| all[position].clone()).collect();
+        assert_eq!(all_pictures(&filtered, camera), expected);
+    }
+    let stats = |root: &Path| -> serde_json::Value { ntp::artifact::read_json(&root.join("meta/stats.json")).unwrap() };
+    for (camera, ..) in CAMERAS {
+        let feature = format!("observation.images.{camera}");
+        assert_eq!(stats(&filtered)[&feature], stats(&alone)[&feature]);
+    }
+    assert_opens_in_rerun(&filtered);
+}
+
+#[test]
+fn parts_of_a_split_dataset_hold_every_picture_once() {
+    let made = made(FrameChoice::Boundaries);
+    let folder = tempfile::tempdir().unwrap();
+    let parts = split(&made.root, &SplitBy::Task, &folder.path().join("parts")).unwrap();
+    let mut n_pictures = 0;
+    for (name, _) in &parts {
+        let part = folder.path().join("parts").join(name);
+        assert_eq!(validate(&part).findings, []);
+        n_pictures += all_pictures(&part, "wrist").concat().len();
+    }
+    assert_eq!(n_pictures, all_pictures(&made.root, "wrist").concat().len());
+}
+
+#[test]
+fn a_repaired_dataset_ends_before_the_first_picture_that_cannot_be_decoded() {
+    let made = made(FrameChoice::Boundaries);
+    let path = made.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4");
+    let before = all_pictures(&made.root, "wrist");
+    let offset = sample_offset(&path, before[..3].concat().len());
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[offset + 40..offset + 200].fill(0x55);
+    std::fs::write(&path, &bytes).unwrap();
+    let mended = made.root.with_file_name("mended");
+    let repaired = repair(&made.root, &mended).unwrap();
+    assert_eq!(repaired.written.unwrap().episodes, 3);
+    assert!(
+        repaired.reasons.iter().any(|reason| reason.contains("observation.images.wrist")),
+        "{:?}",
+        repaired.reasons
+    );
+    assert_eq!(validate(&mended).findings, []);
+    assert_eq!(all_pictures(&mended, "wrist"), before[..3]);
+}
+
+/// Where a sample of a video begins: samples lie one after another behind the head of the box `mdat`.
+fn sample_offset(path: &Path, sample: usize) -> usize {
+    let bytes = std::fs::read(path).unwrap();
+    let begin = bytes.windows(4).position(|name| name == b"mdat").unwrap() + 4;
+    let mut reader = Mp4Reader::open(path).unwrap();
+    let mut packet = Vec::new();
+    let sets = reader.parameter_sets().len();
+    (0..sample).fold(begin, |offset, sample| {
+        reader.read(sample, &mut packet).unwrap();
+        offset + packet.len() - if reader.samples()[sample].is_key { sets } else { 0 }
+    })
+}
+
+#[test]
+fn a_difference_names_the_pictures_that_changed() {
+    let [a, b] = [made(FrameChoice::Boundaries), made(FrameChoice::Boundaries)];
+    assert!(diff(&a.root, &b.root).unwrap().is_none());
+    let path = b.root.join("videos/observation.images.wrist/chunk-000/file-000.mp4");
+    let pictures = all_pictures(&b.root, "wrist");
+    let offset = sample_offset(&path, pictures[..2].concat().len());
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[offset + 40] ^= 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let found = diff(&a.root, &b.root).unwrap();
+    assert_eq!((found.changed, found.same), (1, a.episodes.len() as u64 - 1));
+    assert_eq!(found.changed_episodes[0].before.episode_index, 2);
+    assert_eq!(found.changed_episodes[0].frames, [("observation.images.wrist".to_owned(), 1)].into());
+}
+
+#[test]
+fn pictures_that_do_not_fit_together_are_refused_by_name() {
+    let (folder, [a, b, _]) = parts(FrameChoice::Boundaries);
+    let refused = |sources: &[PathBuf], code: &str, words: &str| {
+        let error = merge(sources, &folder.path().join("merged")).unwrap_err().to_string();
+        assert!(error.starts_with(code) && error.contains(words), "{error:?} is no {code} with {words:?}");
+    };
+    let other = folder.path().join("other");
+    let wider: Vec<_> = cameras().into_iter().map(|camera| CameraConfig { size_px: [96, 48], ..camera }).collect();
+    convert_to(&[&film(folder.path(), "wider", &dense()[2..], &wider)], FrameChoice::Boundaries, &other);
+    refused(&[a.clone(), other.clone()], "edit.features", "observation.images");
+    std::fs::remove_dir_all(&other).unwrap();
+    convert_to(&[&film(folder.path(), "blind", &dense()[2..], &[])], FrameChoice::Boundaries, &other);
+    refused(&[a.clone(), other], "edit.features", "observation.images");
+    let info = b.join("meta/info.json");
+    let text = std::fs::read_to_string(&info).unwrap();
+    std::fs::write(&info, text.replace("\"h264\"", "\"av1\"")).unwrap();
+    refused(&[a, b], "edit.video", "av1");
 }

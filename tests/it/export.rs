@@ -103,6 +103,17 @@ fn sarm_s_proportions_are_means_over_episodes() {
 }
 
 #[test]
+fn sarm_s_stages_are_in_the_order_in_which_they_come() {
+    let folder = exported(LabelForm::Sarm);
+    let text = std::fs::read_to_string(folder.path().join("labels/meta/temporal_proportions_sparse.json")).unwrap();
+    let place = |name: &str| text.find(name).unwrap_or_else(|| panic!("{name} is not in {text}"));
+    // Of one task: by name the second would come first.
+    let rows = rows(&folder.path().join("labels").join(META));
+    let [first, second] = [0, 1].map(|at| texts(&rows, "sparse_subtask_names", 4)[at].clone());
+    assert!(place(&first) < place(&second), "{first}, {second}: {text}");
+}
+
+#[test]
 fn behavior_s_annotations_name_skills_and_their_primitives() {
     let folder = exported(LabelForm::Behavior);
     let path = folder.path().join("labels/annotations/task-0001/episode_00000002.json");

@@ -19,7 +19,7 @@ const DATA: &str = "data/chunk-000/file-000.parquet";
 const CALLS: &str = "ntp/calls/chunk-000/file-000.parquet";
 
 /// A dataset as others have them: no columns of ours, no robot, tasks in a column of that name.
-fn theirs(root: &Path) {
+pub(crate) fn theirs(root: &Path) {
     let own = tempfile::tempdir().unwrap();
     convert_all(&episodes(), &ConvertConfig::default(), own.path()).unwrap();
     export(own.path(), LabelForm::SubtaskIndex, root).unwrap();

@@ -63,3 +63,15 @@ fn reruns_reader_finds_the_episodes_tasks_and_features_that_were_written() {
         assert_eq!(opened.features, columns.into_iter().map(|(name, _)| name).collect());
     }
 }
+
+/// For `tests/foreign/run.sh`, which names a dataset that was made by the program.
+#[test]
+#[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "the dataset is named from outside, and told of")]
+fn reruns_reader_opens_the_dataset_that_is_named() {
+    let Ok(root) = std::env::var("NTP_DATASET") else { return };
+    let Opened { episode_frames, tasks, .. } = open(Path::new(&root));
+    let (n_episodes, n_frames) = (episode_frames.len(), episode_frames.iter().sum::<usize>());
+    let summary = ntp::dataset::summarize(Path::new(&root)).unwrap();
+    assert_eq!((n_episodes as u64, n_frames as u64), (summary.total_episodes, summary.total_frames));
+    println!("re_lerobot: opened, {n_episodes} episodes, {n_frames} frames, {} tasks", tasks.len());
+}

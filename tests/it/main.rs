@@ -6,10 +6,14 @@ mod architecture;
 mod artifact;
 #[cfg(test)]
 mod cli;
+#[cfg(all(test, feature = "cloud"))]
+mod cloud;
 #[cfg(test)]
 mod dataset;
 #[cfg(test)]
 mod dataset_edit;
+#[cfg(test)]
+mod dataset_loading;
 #[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
@@ -39,7 +43,11 @@ mod painter;
 #[cfg(test)]
 mod pipeline;
 #[cfg(test)]
+mod pipeline_pictures;
+#[cfg(test)]
 mod pipeline_suites;
+#[cfg(test)]
+mod playback;
 #[cfg(test)]
 mod publish;
 #[cfg(test)]

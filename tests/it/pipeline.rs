@@ -261,6 +261,9 @@ fn a_wrong_pipeline_file_names_file_key_and_what_is_allowed_and_writes_nothing()
     check_refused(model("decoders = [\"mss\", \"mss\"]"), "models[0].decoders", "mss is there twice");
     check_refused(model("tag = \"a b\""), "models[0].tag", "letters");
     check_refused(model("suites = [\"stacking\"]"), "models[0].suites", "there are stacking_unseen");
+    let tasks = |more: &'static str| move |text: &str| text.replace("unseen = 4", &format!("unseen = 4\n{more}"));
+    check_refused(tasks("blocks = 9"), "tasks.blocks", "2 to 8");
+    check_refused(tasks("blocks = 2"), "tasks.train", "block_stacking with 2 blocks has at most 2 training tasks");
     let counts = "episodes = 4\non_table = { min = 1, max = 2 }";
     check_refused(|text| text.replace("episodes = 4\n", &format!("{counts}\n")), "on_table", "no categories");
 }

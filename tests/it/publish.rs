@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use ntp::dataset::{ConvertConfig, schema};
-use ntp::publish::{Date, Difference, License, Publication, PublishError, PublishSummary, meaning, publish, verify};
+use ntp::publish::{
+    Date, Difference, Folder, License, Publication, PublishError, PublishSummary, meaning, publish, verify,
+};
 use ntp::table::TableSchema;
 use serde_json::Value;
 
@@ -13,20 +15,20 @@ use crate::lerobot;
 use crate::pipeline::{hashes, run};
 
 /// A small dataset, and beside it a folder to publish into.
-struct Place {
+pub(crate) struct Place {
     _folder: tempfile::TempDir,
-    dataset: PathBuf,
-    to: PathBuf,
+    pub(crate) dataset: PathBuf,
+    pub(crate) to: PathBuf,
 }
 
-fn place() -> Place {
+pub(crate) fn place() -> Place {
     let folder = tempfile::tempdir().unwrap();
     let (dataset, to) = (folder.path().join("dataset"), folder.path().join("published"));
     convert_all(&episodes(), &ConvertConfig::default(), &dataset).unwrap();
     Place { _folder: folder, dataset, to }
 }
 
-fn publication() -> Publication {
+pub(crate) fn publication() -> Publication {
     Publication {
         license: "CC-BY-4.0".parse().unwrap(),
         date: "2026-11-24".parse().unwrap(),
@@ -38,7 +40,7 @@ fn publication() -> Publication {
 }
 
 fn publish_to(place: &Place) -> Result<PublishSummary, PublishError> {
-    publish(&place.dataset, &place.to, &publication(), || true)
+    publish(&place.dataset, &Folder::new(&place.to), &publication(), || true)
 }
 
 fn text(place: &Place, file: &str) -> String {
@@ -52,7 +54,7 @@ fn what_is_published_is_the_dataset_with_card_metadata_and_checksums() {
     assert_eq!(summary.kept, 0);
     assert_eq!(hashes(&place.dataset, &["data", "meta", "ntp"]), hashes(&place.to, &["data", "meta", "ntp"]));
     assert_eq!(lerobot::open(&place.dataset), lerobot::open(&place.to));
-    let found = verify(&place.to).unwrap();
+    let found = verify(&Folder::new(&place.to)).unwrap();
     assert_eq!((found.files + 1, found.differences.len()), (summary.files, 0));
     let card = text(&place, "README.md");
     for part in [
@@ -122,13 +124,16 @@ fn an_interrupted_publication_goes_on_where_it_was() {
         **left -= 1;
         **left >= 0
     };
-    assert!(matches!(publish(&place.dataset, &place.to, &publication(), go_on), Err(PublishError::Interrupted)));
+    assert!(matches!(
+        publish(&place.dataset, &Folder::new(&place.to), &publication(), go_on),
+        Err(PublishError::Interrupted)
+    ));
     assert!(!place.to.join("SHA256SUMS").exists(), "what is not whole must not look so");
     // A process that was killed leaves a half-written file under a name of its own.
     std::fs::write(place.to.join(".partial-x"), "half").unwrap();
     let summary = publish_to(&place).unwrap();
     assert_eq!(summary.kept, 3);
-    assert!(verify(&place.to).unwrap().differences.is_empty());
+    assert!(verify(&Folder::new(&place.to)).unwrap().differences.is_empty());
     assert!(!place.to.join(".partial-x").exists());
 }
 
@@ -168,7 +173,7 @@ fn each_way_in_which_a_copy_differs_is_named() {
     std::fs::write(place.to.join("stray.txt"), "hello").unwrap();
     let sums = text(&place, "SHA256SUMS");
     std::fs::write(place.to.join("SHA256SUMS"), format!("{sums}{}  ../outside\nno line\n", "0".repeat(64))).unwrap();
-    let found = verify(&place.to).unwrap().differences;
+    let found = verify(&Folder::new(&place.to)).unwrap().differences;
     let found: Vec<(&str, Difference)> = found.iter().map(|of| (of.path.as_str(), of.difference)).collect();
     let outside = format!("{}  ../outside", "0".repeat(64));
     let expected = [

@@ -122,15 +122,20 @@ fn read_back(replays: &[Replay<'_>]) -> Read {
     let summary = save_replays(replays, &path).unwrap();
     assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
     assert_eq!(summary.episodes, replays.len());
-    let mut read = Read { recordings: BTreeMap::new(), _folder: folder, path };
-    for message in decode(&read.path) {
+    Read { recordings: recordings(&path), _folder: folder, path }
+}
+
+/// The chunks of each recording in a file, blueprints left out.
+pub(crate) fn recordings(path: &Path) -> BTreeMap<String, Vec<Chunk>> {
+    let mut recordings: BTreeMap<String, Vec<Chunk>> = BTreeMap::new();
+    for message in decode(path) {
         let LogMsg::ArrowMsg(store, message) = message else { continue };
         let chunk = Chunk::from_arrow_msg(&message).unwrap();
         if store.kind() == StoreKind::Recording {
-            read.recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
+            recordings.entry(store.recording_id().to_string()).or_default().push(chunk);
         }
     }
-    read
+    recordings
 }
 
 impl Read {
@@ -140,11 +145,11 @@ impl Read {
     }
 }
 
-fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
+pub(crate) fn entities(chunks: &[Chunk]) -> BTreeSet<String> {
     chunks.iter().map(|chunk| chunk.entity_path().to_string()).collect()
 }
 
-fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
+pub(crate) fn temporal<'c>(chunks: &'c [Chunk], entity: &str) -> &'c Chunk {
     let found: Vec<&Chunk> =
         chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity && !chunk.is_static()).collect();
     assert_eq!(found.len(), 1, "{entity}");
@@ -156,7 +161,7 @@ fn times(chunk: &Chunk, timeline: &'static str) -> Vec<i64> {
 }
 
 /// Frames and labels of a lane.
-fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
+pub(crate) fn lane(chunks: &[Chunk], entity: &str) -> Vec<(i64, String)> {
     let chunk = temporal(chunks, entity);
     let component = rerun::StateChange::descriptor_state().component;
     let labels = chunk.iter_slices::<String>(component);
@@ -177,7 +182,7 @@ fn replays_of_a_tower() -> (Episode, Episode, Episode) {
 #[test]
 fn a_recording_has_scene_programs_scopes_and_words_on_two_timelines() {
     let (_, shown, acted) = replays_of_a_tower();
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     let chunks = read.only();
     let found = entities(chunks);
     let bodies = acted.scene.bodies.iter().map(|body| format!("/world/bodies/{}", body.name));
@@ -268,7 +273,7 @@ fn check_lanes(chunks: &[Chunk], root: &str, episode: &Episode) {
 fn each_calls_lane_begins_and_ends_at_its_frames() {
     let (expert, shown, acted) = replays_of_a_tower();
     check_lanes(read_back(&[Replay::from(&expert)]).only(), "programs", &expert);
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     check_lanes(read.only(), "programs", &acted);
     check_lanes(read.only(), "programs_of_expert", &shown);
 }
@@ -277,7 +282,7 @@ fn each_calls_lane_begins_and_ends_at_its_frames() {
 fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
     let (_, shown, acted) = replays_of_a_tower();
     let divergence = Divergence { decision: 6, kind: DivergenceKind::Argument, program: Program::Pick };
-    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence) };
+    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence), cameras: &[] };
     let read = read_back(&[replay]);
     let frame = i64::from(acted.calls[7].frames.begin);
     assert!(frame > 0);
@@ -365,7 +370,7 @@ fn bars(chunks: &[Chunk], entity: &str) -> Vec<Option<(f32, f32)>> {
 fn scopes_are_the_output_spans_on_the_boundary_frames_of_the_specification() {
     let (expert, shown, acted) = replays_of_a_tower();
     for (episode, demonstration) in [(&expert, None), (&acted, Some(&shown))] {
-        let read = read_back(&[Replay { episode, demonstration, divergence: None }]);
+        let read = read_back(&[Replay { episode, demonstration, divergence: None, cameras: &[] }]);
         let spans = if demonstration.is_none() { episode.clone().boundaries_only() } else { episode.clone() };
         for depth in 0..3_u8 {
             let entity = format!("/specification/scope/depth_{depth}");
@@ -397,7 +402,7 @@ fn probabilities_are_those_of_the_decisions() {
 #[test]
 fn the_same_replays_give_the_same_bytes() {
     let (expert, shown, acted) = replays_of_a_tower();
-    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None }];
+    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }];
     let (first, second) = (read_back(&replays), read_back(&replays));
     let (first, second) = (std::fs::read(&first.path).unwrap(), std::fs::read(&second.path).unwrap());
     let first_difference = first.iter().zip(&second).position(|(a, b)| a != b);
@@ -519,7 +524,7 @@ fn a_demonstration_of_another_length_is_refused_by_number() {
     let foreign = demonstration(&other, &trial(&other, 0, 1), 3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("episode.rrd");
-    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None }];
+    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None, cameras: &[] }];
     let error = save_replays(&replays, &path).unwrap_err();
     let expected = "episode 42 was given a specification of 13 frames, but the demonstration to show beside it \
                     (episode 3) has 5 boundary frames";

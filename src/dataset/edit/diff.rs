@@ -45,7 +45,7 @@ pub struct ChangedEpisode {
     pub calls: Vec<i64>,
     /// How many scoping labels differ, or are in one alone.
     pub scopes: u64,
-    /// By column of `data/`, in how many frames it differs. `rows` counts frames that are in one alone.
+    /// By column of `data/` and video, in how many frames it differs. `rows` counts frames that are in one alone.
     pub frames: BTreeMap<String, u64>,
 }
 

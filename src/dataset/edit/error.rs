@@ -8,6 +8,7 @@ use crate::artifact::{ContractError, IoError, StagingError};
 use crate::dataset::DatasetError;
 use crate::recording::RecordingError;
 use crate::table::TableError;
+use crate::video::VideoError;
 
 /// A dataset could not be edited.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +28,9 @@ pub enum EditError {
     /// The folder could not be made.
     #[error(transparent)]
     Staging(#[from] StagingError),
+    /// A video could not be written.
+    #[error(transparent)]
+    Video(#[from] VideoError),
     /// A recording could not be written.
     #[error(transparent)]
     Recording(#[from] RecordingError),

@@ -9,7 +9,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::edit::source::{FILES, Source};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::feature::Dtype;
-use crate::dataset::info::{LEROBOT_VERSION, NTP_VERSION};
+use crate::dataset::info::{CameraInfo, FeatureInfo, LEROBOT_VERSION, NTP_VERSION};
 use crate::dataset::layout::{self, FilePlace};
 use crate::program::vocabulary_hash;
 
@@ -25,21 +25,33 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = format!("schema_version is {}, but {NTP_VERSION} is edited", ntp.schema_version);
         return refused("edit.version", layout::NTP_INFO, problem);
     }
-    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| feature.dtype == Dtype::Video) {
-        let problem = format!("feature {name:?} is a video, and videos cannot be edited; images can");
-        return refused("edit.video", layout::INFO, problem);
-    }
     if ntp.vocabulary_hash != vocabulary_hash() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }
-    // Files beside the tables and statistics of pictures are not carried over, and must not be lost in silence.
-    let carried = [Dtype::Float32, Dtype::Float64, Dtype::Int64, Dtype::Bool, Dtype::String];
-    if let Some((name, _)) = info.features.0.iter().find(|(_, feature)| !carried.contains(&feature.dtype)) {
-        let problem = format!("feature {name:?} is of a type that cannot be carried over");
-        return refused("edit.features", layout::INFO, problem);
+    match info.features.0.iter().find_map(|(name, feature)| feature_problem(name, feature)) {
+        Some((code, problem)) => refused(code, layout::INFO, problem),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+/// Why a feature cannot be carried over: values of types that are not known, and pictures that cannot be decoded here.
+fn feature_problem(name: &str, feature: &FeatureInfo) -> Option<(&'static str, String)> {
+    let refused = |code, problem: String| Some((code, format!("feature {name:?} {problem}")));
+    match feature.dtype {
+        Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool | Dtype::String => None,
+        Dtype::Other => refused("edit.features", "is of a type that cannot be carried over".to_owned()),
+        Dtype::Image | Dtype::Video if !matches!(feature.shape[..], [_, _, 3]) => {
+            refused("edit.features", format!("has shape {:?}, but pictures are [height, width, 3]", feature.shape))
+        }
+        Dtype::Image => None,
+        Dtype::Video => match feature.info.as_ref().map(CameraInfo::codec) {
+            Some("h264") => None,
+            codec => {
+                refused("edit.video", format!("is a video in {:?}, but h264 alone is copied", codec.unwrap_or("")))
+            }
+        },
+    }
 }
 
 /// Whether a dataset can be appended to the first one.
@@ -72,7 +84,11 @@ pub(super) fn check_like(first: &Source, other: &Source) -> Result<(), EditError
 fn other_feature(first: &Source, other: &Source) -> Option<(String, String, String)> {
     let of = |source: &Source| -> BTreeMap<String, String> {
         let features = source.info.features.0.iter();
-        features.map(|(name, feature)| (name.clone(), format!("{:?} {:?}", feature.dtype, feature.shape))).collect()
+        let text = |feature: &FeatureInfo| {
+            let codec = feature.info.as_ref().map_or("", CameraInfo::codec);
+            format!("{:?} {:?} {codec}", feature.dtype, feature.shape).trim_end().to_owned()
+        };
+        features.map(|(name, feature)| (name.clone(), text(feature))).collect()
     };
     let (expected, found) = (of(first), of(other));
     let names: BTreeSet<&String> = expected.keys().chain(found.keys()).collect();

@@ -4,22 +4,41 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, AsArray as _, Float64Array, Int64Array, ListArray, RecordBatch};
 use arrow::buffer::OffsetBuffer;
-use arrow::datatypes::{DataType, Field, Float32Type, Float64Type, Int64Type};
+use arrow::datatypes::{DataType, Field, Float32Type, Float64Type, Int64Type, Schema};
 use arrow::error::ArrowError;
 
-use crate::dataset::feature::Dtype;
+use crate::dataset::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::info::Info;
 use crate::dataset::statistics::NumericFeature;
 use crate::table::Values;
 
+/// The features that have statistics, among the columns of the frames.
+pub(in crate::dataset) fn numeric_features(info: &Info, columns: &Schema) -> Vec<NumericFeature> {
+    let numeric = |name: &str| {
+        let (_, declared) = info.features.0.iter().find(|(feature, _)| feature == name)?;
+        let is_number = matches!(declared.dtype, Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool);
+        let of_ours = FEATURES.iter().find(|feature| feature.name == name);
+        let is_of_episodes = of_ours.is_some_and(Feature::has_episode_statistics);
+        let &[width] = &declared.shape[..] else { return None };
+        (is_number && width > 0).then(|| NumericFeature {
+            name: name.to_owned(),
+            dtype: declared.dtype,
+            width,
+            is_of_episodes,
+        })
+    };
+    columns.fields().iter().filter_map(|field| numeric(field.name())).collect()
+}
+
 /// The flags among the columns of the features, which Arrow keeps as bits.
-pub(super) fn flags(rows: &RecordBatch, features: &[NumericFeature]) -> Vec<Vec<bool>> {
+pub(in crate::dataset) fn flags(rows: &RecordBatch, features: &[NumericFeature]) -> Vec<Vec<bool>> {
     let of = |feature: &NumericFeature| rows.column_by_name(&feature.name)?.as_boolean_opt();
     let flags = |feature: &NumericFeature| of(feature).map(|column| column.values().iter().collect());
     features.iter().map(|feature| flags(feature).unwrap_or_default()).collect()
 }
 
 /// The columns of the features. Each must be there and of its kind.
-pub(super) fn values<'r>(
+pub(in crate::dataset) fn values<'r>(
     rows: &'r RecordBatch,
     features: &'r [NumericFeature],
     flags: &'r [Vec<bool>],
@@ -81,6 +100,15 @@ fn vectors<'r>(
             Some(Values::Float64Vector(&values.as_primitive_opt::<Float64Type>()?.values()[range], width))
         }
         DataType::Int64 => Some(Values::Int64Vector(&values.as_primitive_opt::<Int64Type>()?.values()[range], width)),
+        _ => None,
+    }
+}
+
+/// Single numbers as a column; `None` for anything else.
+pub(super) fn scalars(values: Values<'_>) -> Option<ArrayRef> {
+    match values {
+        Values::Int64(values) => Some(Arc::new(Int64Array::from(values.to_vec()))),
+        Values::Float64(values) => Some(Arc::new(Float64Array::from(values.to_vec()))),
         _ => None,
     }
 }

@@ -12,10 +12,12 @@ use serde_json::json;
 
 use crate::artifact::{StageDir, StagedDir};
 use crate::dataset::edit::fit::check_version;
+use crate::dataset::edit::samples::video_place;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::edit::target::Target;
 use crate::dataset::edit::{EditError, EditSummary, commit};
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::episode_rows::EpisodeRows;
+use crate::dataset::feature::Dtype;
 use crate::dataset::finding::{Severity, Validation};
 use crate::dataset::layout;
 use crate::dataset::validate::EpisodeChecks;
@@ -51,7 +53,11 @@ pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
     let mut description = prefix.source.describe()?;
     let end = loop {
         match prefix.next_verified() {
-            Ok(Some(episode)) => target.append(&episode, &prefix.source)?,
+            Ok(Some(episode)) => match target.append(&episode, &prefix.source) {
+                Ok(()) => {}
+                Err(EditError::Dataset(unreadable)) => break Some(unreadable.to_string()),
+                Err(error) => return Err(error),
+            },
             Ok(None) => break None,
             Err(reason) => break Some(reason),
         }
@@ -114,7 +120,7 @@ impl Prefix {
     /// The next episode, or why it is not verified.
     fn next_verified(&mut self) -> Result<Option<SourceEpisode>, String> {
         let Some(episode) = self.source.next_episode().map_err(|error| error.to_string())? else { return Ok(None) };
-        if let Some(reason) = self.changed_file(&episode.row) {
+        if let Some(reason) = self.changed_file(&episode) {
             return Err(reason);
         }
         let mut validation = Validation::default();
@@ -126,14 +132,21 @@ impl Prefix {
         }
     }
 
-    fn changed_file(&self, row: &EpisodeRow) -> Option<String> {
-        let root = self.source.root();
-        let places = [
+    /// What the manifest says of the files that an episode lies in, where they are not so.
+    fn changed_file(&self, episode: &SourceEpisode) -> Option<String> {
+        let (source, row) = (&self.source, &episode.row);
+        let tables = [
             (layout::DATA, row.data),
             (layout::CALLS, row.calls),
             (layout::SCOPES, row.scopes),
             (layout::META_EPISODES, row.meta),
         ];
-        places.into_iter().find_map(|(folder, place)| self.changed.get(&place.in_dataset(root, folder)).cloned())
+        let tables = tables.into_iter().map(|(folder, place)| place.in_dataset(source.root(), folder));
+        let videos = source.info.features.0.iter().filter(|(_, feature)| feature.dtype == Dtype::Video);
+        let videos = videos.filter_map(|(name, _)| {
+            let (place, _) = video_place(episode, name)?;
+            Some(source.root().join(place.video(name)))
+        });
+        tables.chain(videos).find_map(|file| self.changed.get(&file).cloned())
     }
 }

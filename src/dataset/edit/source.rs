@@ -77,6 +77,11 @@ impl Source {
         &self.root
     }
 
+    /// The file of some frames.
+    pub(super) fn frames_path(&self, place: FilePlace) -> PathBuf {
+        FILES.frames.path(&self.root, place)
+    }
+
     /// The next episode; `None` after the last one.
     pub(super) fn next_episode(&mut self) -> Result<Option<SourceEpisode>, DatasetError> {
         let Some(row) = self.rows.next().transpose()? else { return Ok(None) };

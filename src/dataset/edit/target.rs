@@ -4,21 +4,22 @@ mod finish;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use arrow::array::AsArray as _;
-use arrow::datatypes::{Int64Type, Schema};
+use arrow::datatypes::Int64Type;
 
 use crate::dataset::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::cursor::BatchCursor;
-use crate::dataset::edit::numbers::{flags, lists, values};
+use crate::dataset::edit::numbers::{flags, lists, numeric_features, values};
+use crate::dataset::edit::pictures::CarriedPictures;
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::renumber::{Renumbered, replace};
 use crate::dataset::edit::rolling::RollingBatches;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::episodes::MetaRows;
-use crate::dataset::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::frames::FrameRows;
 use crate::dataset::info::{Info, NtpInfo};
 use crate::dataset::layout::{self, FilePlace};
@@ -81,6 +82,7 @@ pub(super) struct Target {
     ntp: NtpInfo,
     features: Vec<NumericFeature>,
     statistics: Statistics,
+    pictures: CarriedPictures,
     tasks: TextTable,
     subtasks: TextTable,
     families: BTreeSet<Family>,
@@ -115,6 +117,7 @@ impl Target {
             root: root.to_owned(),
             statistics: Statistics::new(root, features.clone()),
             features,
+            pictures: CarriedPictures::new(root, &info, file_bytes),
             tasks: TextTable::default(),
             subtasks: TextTable::default(),
             families: BTreeSet::new(),
@@ -142,8 +145,14 @@ impl Target {
     }
 
     /// Adds an episode of a source, and writes the row groups that are full.
+    ///
+    /// # Errors
+    ///
+    /// [`EditError::Dataset`] when its pictures cannot be read: then nothing of it was added.
     pub(super) fn append(&mut self, episode: &SourceEpisode, source: &Source) -> Result<(), EditError> {
         let (row, pieces) = (&episode.row, &episode.pieces);
+        let pictures = self.pictures.read(episode, source)?;
+        self.pictures.append(&pictures)?;
         self.note(row);
         self.append_meta(row, &pieces.meta)?;
         self.append_provenance(row, &pieces.provenance)?;
@@ -290,8 +299,11 @@ impl Target {
                 Some(lists(field, values).map(|column| (field.name().as_str(), column)))
             });
             let statistics = statistics.collect::<Result<Vec<_>, _>>().map_err(failed())?;
-            self.meta_files.write(&replace(&rows, statistics).map_err(failed())?)?;
+            let videos = self.pictures.meta_columns();
+            let videos = videos.iter().map(|(name, column)| (name.as_str(), Arc::clone(column)));
+            self.meta_files.write(&replace(&rows, statistics.into_iter().chain(videos)).map_err(failed())?)?;
         }
+        self.pictures.clear_episodes();
         self.statistics.clear();
         let rows = self.provenance.take().map_err(EditError::rows(layout::EPISODES))?;
         Ok(rows.map_or(Ok(()), |rows| self.provenance_file.write(&rows))?)
@@ -300,22 +312,4 @@ impl Target {
 
 fn numbers_of(place: FilePlace) -> [i64; 2] {
     [i64::from(place.chunk), i64::from(place.file)]
-}
-
-/// The features that have statistics, among the columns of the frames.
-fn numeric_features(info: &Info, columns: &Schema) -> Vec<NumericFeature> {
-    let numeric = |name: &str| {
-        let (_, declared) = info.features.0.iter().find(|(feature, _)| feature == name)?;
-        let is_number = matches!(declared.dtype, Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool);
-        let of_ours = FEATURES.iter().find(|feature| feature.name == name);
-        let is_of_episodes = of_ours.is_some_and(Feature::has_episode_statistics);
-        let &[width] = &declared.shape[..] else { return None };
-        (is_number && width > 0).then(|| NumericFeature {
-            name: name.to_owned(),
-            dtype: declared.dtype,
-            width,
-            is_of_episodes,
-        })
-    };
-    columns.fields().iter().filter_map(|field| numeric(field.name())).collect()
 }

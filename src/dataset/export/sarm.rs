@@ -11,6 +11,7 @@ use arrow::array::{ArrayRef, Float64Array, Int64Array, ListArray, StringArray};
 use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{DataType, Field};
 use arrow::error::ArrowError;
+use serde::{Serialize, Serializer};
 
 use crate::artifact::write_json;
 use crate::dataset::edit::EditError;
@@ -102,21 +103,45 @@ impl Columns {
 /// The mean over episodes of the share of an episode's labelled frames that each label takes (SARM, formula 1).
 #[derive(Default)]
 struct Proportions {
-    sums: BTreeMap<String, f64>,
+    shares: BTreeMap<String, Share>,
     n_episodes: u64,
+}
+
+#[derive(Default)]
+struct Share {
+    frames: f64,
+    /// Where it begins, and how often.
+    begins: f64,
+    n_labels: u64,
 }
 
 impl Proportions {
     fn add(&mut self, labels: &[Label]) {
         let total: u32 = labels.iter().map(|label| label.end - label.begin).sum();
         for label in labels {
-            *self.sums.entry(label.text.clone()).or_default() += f64::from(label.end - label.begin) / f64::from(total);
+            let share = self.shares.entry(label.text.clone()).or_default();
+            share.frames += f64::from(label.end - label.begin) / f64::from(total);
+            share.begins += f64::from(label.begin) / f64::from(total);
+            share.n_labels += 1;
         }
         self.n_episodes += u64::from(total > 0);
     }
 
-    fn finish(self) -> BTreeMap<String, f64> {
+    /// Labels in the order in which they come on average: SARM numbers its stages so.
+    fn finish(self) -> InOrder {
         let n_episodes = self.n_episodes.max(1) as f64;
-        self.sums.into_iter().map(|(name, sum)| (name, sum / n_episodes)).collect()
+        let mut labels: Vec<(String, Share)> = self.shares.into_iter().collect();
+        let mean_begin = |share: &Share| share.begins / share.n_labels.max(1) as f64;
+        labels.sort_by(|(_, a), (_, b)| mean_begin(a).total_cmp(&mean_begin(b)));
+        InOrder(labels.into_iter().map(|(name, share)| (name, share.frames / n_episodes)).collect())
+    }
+}
+
+/// A JSON object whose keys keep their order.
+struct InOrder(Vec<(String, f64)>);
+
+impl Serialize for InOrder {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, share)| (name, share)))
     }
 }

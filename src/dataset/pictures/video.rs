@@ -8,7 +8,7 @@ use crate::table::Values;
 use crate::video::{Mp4Writer, VideoError};
 
 /// Files of videos, the last of which is being written. Its pictures are in memory.
-pub(super) struct VideoFiles {
+pub(in crate::dataset) struct VideoFiles {
     root: PathBuf,
     feature: String,
     size_px: [u32; 2],
@@ -25,7 +25,7 @@ pub(super) struct VideoFiles {
 }
 
 impl VideoFiles {
-    pub(super) fn new(root: &Path, feature: &str, size_px: [u32; 2], fps: u32, file_bytes: usize) -> Self {
+    pub(in crate::dataset) fn new(root: &Path, feature: &str, size_px: [u32; 2], fps: u32, file_bytes: usize) -> Self {
         Self {
             root: root.to_owned(),
             feature: feature.to_owned(),
@@ -44,7 +44,7 @@ impl VideoFiles {
     }
 
     /// Adds an episode's packets, the first of which is a key frame.
-    pub(super) fn append(&mut self, packets: &[&Vec<u8>]) -> Result<(), VideoError> {
+    pub(in crate::dataset) fn append(&mut self, packets: &[&Vec<u8>]) -> Result<(), VideoError> {
         let mut writer = match self.writer.take() {
             Some(writer) => writer,
             None => {
@@ -61,16 +61,20 @@ impl VideoFiles {
         self.numbers.push(i64::from(self.place.file));
         self.from_secs.push(seconds(from));
         self.to_secs.push(seconds(writer.n_samples()));
-        if writer.n_bytes() < self.file_bytes {
-            self.writer = Some(writer);
-            return Ok(());
-        }
+        let is_full = writer.n_bytes() >= self.file_bytes;
+        self.writer = Some(writer);
+        if is_full { self.end_file() } else { Ok(()) }
+    }
+
+    /// Ends the file that is being written, if there is one: the next episode begins another.
+    pub(in crate::dataset) fn end_file(&mut self) -> Result<(), VideoError> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
         self.place = self.place.next();
         writer.finish()
     }
 
     /// The columns of episodes that are not yet written.
-    pub(super) fn columns(&self) -> [(&str, Values<'_>); 4] {
+    pub(in crate::dataset) fn columns(&self) -> [(&str, Values<'_>); 4] {
         let [chunk, file, from, to] = &self.names;
         [
             (chunk, Values::Int64(&self.chunks)),
@@ -81,13 +85,13 @@ impl VideoFiles {
     }
 
     /// Forgets the rows of episodes.
-    pub(super) fn clear(&mut self) {
+    pub(in crate::dataset) fn clear(&mut self) {
         [&mut self.chunks, &mut self.numbers].into_iter().for_each(Vec::clear);
         [&mut self.from_secs, &mut self.to_secs].into_iter().for_each(Vec::clear);
     }
 
     /// Ends the last file. Returns all of them.
-    pub(super) fn finish(self) -> Result<Vec<String>, VideoError> {
+    pub(in crate::dataset) fn finish(self) -> Result<Vec<String>, VideoError> {
         self.writer.map_or(Ok(()), Mp4Writer::finish)?;
         Ok(self.files)
     }

@@ -7,13 +7,12 @@ use crate::dataset::config::ConvertConfig;
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::{CameraInfo, FeatureInfo};
-use crate::dataset::pictures::statistics::Histogram;
-use crate::dataset::pictures::video::VideoFiles;
-use crate::dataset::pictures::{PREFIX, PictureStatistics, video_columns};
+use crate::dataset::pictures::statistics::EpisodeStatistics;
+use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
 use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
-use crate::table::Values;
-use crate::video::{H264Decoder, Rgb, VideoError, decode_png};
+use crate::table::{ColumnKind, Value, Values};
+use crate::video::VideoError;
 
 /// Bytes of pictures that make a row group, at least.
 const GROUP_BYTES: usize = 1 << 25;
@@ -32,8 +31,8 @@ struct PictureFeature {
     camera: String,
     size_px: [u32; 2],
     store: Store,
-    histogram: Histogram,
-    decoded: Rgb,
+    episodes: EpisodeStatistics,
+    measure: PictureMeasure,
 }
 
 /// Where pictures go.
@@ -56,7 +55,8 @@ impl PictureFeatures {
                 }
             };
             let (camera, size_px) = (pictures.camera.clone(), pictures.size_px);
-            PictureFeature { name, camera, size_px, store, histogram: Histogram::default(), decoded: Rgb::default() }
+            let (episodes, measure) = (EpisodeStatistics::new(&name), PictureMeasure::new(size_px));
+            PictureFeature { name, camera, size_px, store, episodes, measure }
         };
         Self { features: cameras.iter().map(feature).collect(), fps }
     }
@@ -73,14 +73,18 @@ impl PictureFeatures {
 
     /// Further columns of `meta/episodes/`.
     pub(in crate::dataset) fn meta_schema(&self) -> Vec<String> {
-        let videos = self.features.iter().filter(|feature| matches!(feature.store, Store::Videos(_)));
-        let columns = videos.flat_map(|feature| video_columns(&feature.name));
-        columns
-            .map(|(name, kind)| {
-                let physical = if kind.value == crate::table::Value::Int64 { "int64" } else { "double" };
-                format!("  required {physical} {name};\n")
-            })
-            .collect()
+        let place = |(name, kind): (String, ColumnKind)| {
+            let physical = if kind.value == Value::Int64 { "int64" } else { "double" };
+            format!("  required {physical} {name};\n")
+        };
+        let of_feature = |feature: &PictureFeature| {
+            let places = match feature.store {
+                Store::Column(_) => Vec::new(),
+                Store::Videos(_) => video_columns(&feature.name).map(place).into(),
+            };
+            places.into_iter().chain(feature.episodes.schema()).collect::<Vec<_>>()
+        };
+        self.features.iter().flat_map(of_feature).collect()
     }
 
     /// Adds an episode's pictures, those of the frames that become rows.
@@ -119,11 +123,13 @@ impl PictureFeatures {
 
     /// The columns of `meta/episodes/`.
     pub(in crate::dataset) fn meta_columns(&self) -> impl Iterator<Item = (&str, Values<'_>)> {
-        let videos = self.features.iter().filter_map(|feature| match &feature.store {
-            Store::Column(_) => None,
-            Store::Videos(videos) => Some(videos.columns()),
-        });
-        videos.flatten()
+        self.features.iter().flat_map(|feature| {
+            let videos = match &feature.store {
+                Store::Column(_) => None,
+                Store::Videos(videos) => Some(videos.columns()),
+            };
+            videos.into_iter().flatten().chain(feature.episodes.columns())
+        })
     }
 
     /// Whether rows should be written before there are more.
@@ -147,6 +153,7 @@ impl PictureFeatures {
     /// Forgets the rows of `meta/episodes/`.
     pub(in crate::dataset) fn clear_episodes(&mut self) {
         for feature in &mut self.features {
+            feature.episodes.clear();
             if let Store::Videos(videos) = &mut feature.store {
                 videos.clear();
             }
@@ -160,7 +167,7 @@ impl PictureFeatures {
 
     /// Statistics by feature.
     pub(in crate::dataset) fn statistics(&self) -> Vec<(String, PictureStatistics)> {
-        self.features.iter().map(|feature| (feature.name.clone(), feature.histogram.statistics())).collect()
+        self.features.iter().map(|feature| (feature.name.clone(), feature.measure.statistics())).collect()
     }
 
     /// Ends the videos. Returns their files.
@@ -198,25 +205,19 @@ impl PictureFeature {
 
     /// Adds an episode's pictures; each is decoded, for the statistics and so that none is written that is damaged.
     fn append(&mut self, rows: &[&Vec<u8>]) -> Result<(), VideoError> {
-        let expected = self.size_px;
-        let mut decoder = match self.store {
-            Store::Column(_) => None,
-            Store::Videos(_) => Some(H264Decoder::new()?),
-        };
-        for row in rows {
-            match &mut decoder {
-                None => self.decoded = decode_png(row)?,
-                Some(decoder) => decoder.decode(row, &mut self.decoded)?,
-            }
-            if self.decoded.size_px != expected {
-                return Err(VideoError::Size { found: self.decoded.size_px, expected });
-            }
-            self.histogram.add(&self.decoded);
-        }
+        let mut episode = PictureMeasure::new(self.size_px);
         match &mut self.store {
-            Store::Column(column) => column.extend(rows.iter().map(|row| (*row).clone())),
-            Store::Videos(videos) => videos.append(rows)?,
+            Store::Column(column) => {
+                rows.iter().try_for_each(|row| episode.add_png(row))?;
+                column.extend(rows.iter().map(|row| (*row).clone()));
+            }
+            Store::Videos(videos) => {
+                episode.add_video(rows.iter().copied())?;
+                videos.append(rows)?;
+            }
         }
+        self.measure.merge(&episode);
+        self.episodes.append(episode.statistics());
         Ok(())
     }
 

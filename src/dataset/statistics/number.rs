@@ -53,12 +53,16 @@ pub(super) fn n_bytes(dtype: Dtype) -> usize {
 }
 
 /// The numbers of some rows as values, row by row. A column of texts has none.
-pub(super) fn copy_values(column: Values<'_>, rows: Range<usize>, values: &mut Vec<f64>) {
+pub(in crate::dataset) fn copy_values(column: Values<'_>, rows: Range<usize>, values: &mut Vec<f64>) {
     values.clear();
     match column {
         Values::Float32(all) => values.extend(all[rows].iter().map(|&value| f64::from(value))),
         Values::Float32Vector(all, width) => {
             values.extend(all[rows.start * width..rows.end * width].iter().map(|&value| f64::from(value)));
+        }
+        Values::Float64Vector(all, width) => values.extend_from_slice(&all[rows.start * width..rows.end * width]),
+        Values::Int64Vector(all, width) => {
+            values.extend(all[rows.start * width..rows.end * width].iter().map(|&value| value as f64));
         }
         Values::Float64(all) => values.extend_from_slice(&all[rows]),
         Values::Int64(all) => values.extend(all[rows].iter().map(|&value| value as f64)),

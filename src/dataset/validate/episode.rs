@@ -8,7 +8,7 @@ use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::finding::Validation;
 use crate::dataset::layout::FilePlace;
-use crate::table::{Columns, TableError};
+use crate::table::{Columns, Form, TableError, TextRows};
 use crate::task::{Family, Split};
 use crate::trace::{Cause, ProgramCall, sentence};
 
@@ -95,15 +95,16 @@ fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
 
 /// Names and sentences in `ntp/calls/`.
 pub(super) struct ArgumentBatch {
-    argument: Vec<Option<String>>,
-    instruction: Vec<Option<String>>,
+    argument: TextRows,
+    instruction: TextRows,
 }
 
 impl Batch for ArgumentBatch {
     const COLUMNS: &'static [&'static str] = &["argument", "instruction"];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { argument: columns.optional_text("argument")?, instruction: columns.optional_text("instruction")? })
+        let mut texts = |name: &str| columns.text_rows(name, Form::Optional);
+        Ok(Self { argument: texts("argument")?, instruction: texts("instruction")? })
     }
 }
 
@@ -114,20 +115,21 @@ pub(super) fn check_arguments(
     calls: &[ProgramCall],
     validation: &mut Validation,
 ) -> Result<(), DatasetError> {
+    let name = |slot: usize| row.slots.get(slot).map_or("", String::as_str);
     for (position, call) in calls.iter().enumerate() {
-        let (batch, at) = cursor.next(row.calls)?;
+        let rows = cursor.next_rows(row.calls, 1)?;
         let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
-        let name = |slot: usize| row.slots.get(slot).map_or("", String::as_str);
-        let (found, said) = (batch.argument[at].clone(), batch.instruction[at].clone());
+        let at = rows.range.start;
+        let (found, said) = (rows.batch.argument.get(at), rows.batch.instruction.get(at));
         let meant = sentence(calls, position, name);
-        if said != meant {
+        if said != meant.as_deref() {
             let message = format!("instruction is {said:?}, but the call is {meant:?}");
-            validation.error("calls.instruction", &cursor.path(), place(), message);
+            validation.error("calls.instruction", &rows.path(), place(), message);
         }
-        let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0)));
-        if found.as_ref() != expected {
+        let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0))).map(String::as_str);
+        if found != expected {
             let message = format!("argument is {found:?}, but its slot is named {expected:?}");
-            validation.error("calls.argument", &cursor.path(), place(), message);
+            validation.error("calls.argument", &rows.path(), place(), message);
         }
     }
     Ok(())

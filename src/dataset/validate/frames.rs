@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use arrow::buffer::{BooleanBuffer, ScalarBuffer};
+
 use crate::dataset::DatasetError;
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
@@ -9,8 +11,9 @@ use crate::dataset::feature::ACTION_NAMES;
 use crate::dataset::finding::Validation;
 use crate::dataset::frame_rows::FrameBatch;
 use crate::dataset::layout;
+use crate::dataset::program_paths::ProgramPaths;
 use crate::dataset::validate::meta::Texts;
-use crate::table::{Columns, FloatRows, TableError};
+use crate::table::{Columns, FloatRows, Form, TableError, TextRows};
 use crate::trace::{Observation, ProgramCall};
 
 /// Every column of `data/`.
@@ -18,15 +21,15 @@ pub(super) struct FullFrameBatch {
     base: FrameBatch,
     action: FloatRows,
     timestamp: Vec<f32>,
-    task_index: Vec<i64>,
-    subtask_index: Vec<i64>,
-    done: Vec<bool>,
-    success: Vec<bool>,
+    task_index: ScalarBuffer<i64>,
+    subtask_index: ScalarBuffer<i64>,
+    done: BooleanBuffer,
+    success: BooleanBuffer,
     time_secs: Vec<f64>,
-    recording_frame: Vec<i64>,
+    recording_frame: ScalarBuffer<i64>,
     gripper: FloatRows,
-    call_id: Vec<i64>,
-    program: Vec<String>,
+    call_id: ScalarBuffer<i64>,
+    program: TextRows,
 }
 
 impl Batch for FullFrameBatch {
@@ -54,15 +57,15 @@ impl Batch for FullFrameBatch {
             base: FrameBatch::take(columns)?,
             action: columns.float_rows("action")?,
             timestamp: columns.float32("timestamp")?,
-            task_index: columns.int64("task_index")?,
-            subtask_index: columns.int64("subtask_index")?,
-            done: columns.boolean("next.done")?,
-            success: columns.boolean("next.success")?,
+            task_index: columns.numbers("task_index")?,
+            subtask_index: columns.numbers("subtask_index")?,
+            done: columns.flags("next.done")?,
+            success: columns.flags("next.success")?,
             time_secs: columns.float64("ntp.time_secs")?,
-            recording_frame: columns.int64("ntp.recording_frame")?,
+            recording_frame: columns.numbers("ntp.recording_frame")?,
             gripper: columns.float_rows("ntp.gripper_in_world_m")?,
-            call_id: columns.int64("ntp.call_id")?,
-            program: columns.text("ntp.program")?,
+            call_id: columns.numbers("ntp.call_id")?,
+            program: columns.text_rows("ntp.program", Form::Required)?,
         })
     }
 }
@@ -75,17 +78,47 @@ struct Before {
     recording_frame: i64,
 }
 
+impl Before {
+    fn new(batch: &FullFrameBatch, at: usize) -> Self {
+        Self {
+            action: first(batch.action.row(at)),
+            gripper: first(batch.gripper.row(at)),
+            time_secs: batch.time_secs[at],
+            recording_frame: batch.recording_frame[at],
+        }
+    }
+}
+
 /// Checks the frames of one episode after another.
 pub(super) struct FrameCheck {
     width: usize,
     fps: u32,
-    /// Smallest and largest of each dimension of `observation.state`.
-    range: Vec<(f32, f32)>,
+    paths: ProgramPaths,
+    range: StateRange,
+}
+
+/// Smallest and largest of each dimension of `observation.state`.
+#[derive(Default)]
+struct StateRange {
+    min: Vec<f32>,
+    max: Vec<f32>,
+}
+
+impl StateRange {
+    fn widen(&mut self, state: &[f32]) {
+        self.min.resize(state.len(), f32::INFINITY);
+        self.max.resize(state.len(), f32::NEG_INFINITY);
+        for ((min, max), &value) in self.min.iter_mut().zip(&mut self.max).zip(state) {
+            *min = if value < *min { value } else { *min };
+            *max = if value > *max { value } else { *max };
+        }
+    }
 }
 
 impl FrameCheck {
     pub(super) fn new(n_slots: usize, fps: u32) -> Self {
-        Self { width: Observation::width(n_slots), fps: fps.max(1), range: Vec::new() }
+        let (width, fps) = (Observation::width(n_slots), fps.max(1));
+        Self { width, fps, paths: ProgramPaths::default(), range: StateRange::default() }
     }
 
     /// Checks the frames of an episode. Labels are checked when its calls are there.
@@ -97,38 +130,31 @@ impl FrameCheck {
         texts: &Texts,
         validation: &mut Validation,
     ) -> Result<(), DatasetError> {
-        let mut labels = calls.map(Labels::new);
+        self.paths.note(calls.unwrap_or_default());
+        let mut labels = calls.map(|calls| Labels::new(calls, &self.paths));
         let mut before: Option<Before> = None;
-        for frame in 0..row.n_frames {
-            let (batch, at) = cursor.next(row.data)?;
-            if let Some(problem) = batch.base.problem(at, row, frame, self.width) {
-                return Err(cursor.problem(problem));
-            }
-            validation.frames += 1;
-            self.widen(batch.base.state.row(at));
-            let mut problems = self.row_problems(batch, at, row, frame, texts);
-            problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
-            problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
-            before = Some(Before {
-                action: first(batch.action.row(at)),
-                gripper: first(batch.gripper.row(at)),
-                time_secs: batch.time_secs[at],
-                recording_frame: batch.recording_frame[at],
-            });
-            for (code, problem) in problems {
-                let place = format!("episode {}, frame {frame}", row.episode_index);
-                validation.error(code, &cursor.path(), place, problem);
+        let mut frame = 0;
+        while frame < row.n_frames {
+            let rows = cursor.next_rows(row.data, usize::try_from(row.n_frames - frame).unwrap_or(1))?;
+            for at in rows.range.clone() {
+                let batch = rows.batch;
+                if let Some(problem) = batch.base.problem(at, row, frame, self.width) {
+                    return Err(rows.problem(at, problem));
+                }
+                validation.frames += 1;
+                self.range.widen(batch.base.state.row(at));
+                let mut problems = self.row_problems(batch, at, row, frame, texts);
+                problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
+                problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
+                before = Some(Before::new(batch, at));
+                for (code, problem) in problems {
+                    let place = format!("episode {}, frame {frame}", row.episode_index);
+                    validation.error(code, &rows.path(), place, problem);
+                }
+                frame += 1;
             }
         }
         Ok(())
-    }
-
-    fn widen(&mut self, state: &[f32]) {
-        self.range.resize(state.len(), (f32::INFINITY, f32::NEG_INFINITY));
-        for ((min, max), value) in self.range.iter_mut().zip(state) {
-            *min = min.min(*value);
-            *max = max.max(*value);
-        }
     }
 
     fn row_problems(
@@ -145,11 +171,11 @@ impl FrameCheck {
             problems.push(("frames.time", format!("timestamp is {}, but should be {timestamp}", batch.timestamp[at])));
         }
         let is_last = frame + 1 == row.n_frames;
-        let flags = (batch.done[at], batch.success[at]);
+        let flags = (batch.done.value(at), batch.success.value(at));
         if flags != (is_last, is_last && row.is_success) {
             problems.push(("frames.done", format!("(next.done, next.success) are {flags:?}")));
         }
-        if frame == 0 && !batch.base.boundary[at] {
+        if frame == 0 && !batch.base.boundary.value(at) {
             problems.push(("frames.boundary", "the first frame is no boundary".to_owned()));
         }
         problems
@@ -173,8 +199,9 @@ impl FrameCheck {
         let Some((min, max)) = &texts.state_range else { return };
         // As floats: they were, before they became decimals.
         let stated = min.iter().zip(max).map(|(min, max)| (*min as f32, *max as f32));
-        let pairs = self.range.iter().copied().zip(stated).enumerate();
-        if let Some((dimension, (seen, stated))) = pairs.into_iter().find(|(_, (seen, stated))| seen != stated) {
+        let seen = self.range.min.iter().copied().zip(self.range.max.iter().copied());
+        let mut pairs = seen.zip(stated).enumerate();
+        if let Some((dimension, (seen, stated))) = pairs.find(|(_, (seen, stated))| seen != stated) {
             let message = format!(
                 "dimension {dimension} is from {} to {}, but the rows are from {} to {}",
                 stated.0, stated.1, seen.0, seen.1
@@ -211,7 +238,7 @@ fn first<const N: usize>(values: &[f32]) -> [f32; N] {
 struct Labels<'c> {
     calls: &'c [ProgramCall],
     /// Stacks of running programs, as texts.
-    paths: Vec<String>,
+    paths: &'c ProgramPaths,
     /// The calls that go on, by position; the root is always there.
     running: Vec<usize>,
     /// Position of the next call that has not begun.
@@ -219,19 +246,12 @@ struct Labels<'c> {
 }
 
 impl<'c> Labels<'c> {
-    fn new(calls: &'c [ProgramCall]) -> Self {
-        let mut paths: Vec<String> = Vec::with_capacity(calls.len());
-        for call in calls {
-            let caller = call.caller.and_then(|caller| paths.get(caller.0 as usize));
-            let name = call.program.name();
-            let path = caller.map_or_else(|| name.to_owned(), |caller| [caller.as_str(), "/", name].concat());
-            paths.push(path);
-        }
+    fn new(calls: &'c [ProgramCall], paths: &'c ProgramPaths) -> Self {
         Self { calls, paths, running: Vec::new(), next: 1 }
     }
 
     /// The deepest call that goes on from a frame, and its path. Frames are asked for in order.
-    fn at(&mut self, frame: i64) -> (i64, &str) {
+    fn at(&mut self, frame: i64) -> (i64, &'c str) {
         let has_ended = |&call: &usize| i64::from(self.calls[call].frames.last()) <= frame;
         while self.running.pop_if(|call| has_ended(call)).is_some() {}
         while let Some(call) = self.calls.get(self.next).filter(|call| i64::from(call.frames.begin) <= frame) {
@@ -241,12 +261,12 @@ impl<'c> Labels<'c> {
             self.next += 1;
         }
         let deepest = self.running.last().copied().unwrap_or(0);
-        (deepest as i64, self.paths.get(deepest).map_or("", String::as_str))
+        (deepest as i64, self.paths.text(deepest))
     }
 }
 
 fn label_problem(expected: (i64, &str), batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
-    let found = (batch.call_id[at], batch.program[at].as_str());
+    let found = (batch.call_id[at], batch.program.row(at));
     (found != expected).then(|| {
         ("frames.label", format!("(ntp.call_id, ntp.program) are {found:?}, but the calls make them {expected:?}"))
     })

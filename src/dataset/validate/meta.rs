@@ -250,15 +250,15 @@ fn episode_statistics_problems(
     feature: &str,
     lengths: &[i64],
 ) -> Result<Vec<(usize, String)>, TableError> {
-    let count = batch.int64_list(&format!("stats/{feature}/count"))?;
-    let mut list = |name: &str| batch.float64_list(&format!("stats/{feature}/{name}"));
+    let count = batch.number_rows(&format!("stats/{feature}/count"))?;
+    let mut list = |name: &str| batch.double_rows(&format!("stats/{feature}/{name}"));
     let (min, mean, max, std) = (list("min")?, list("mean")?, list("max")?, list("std")?);
     let mut problems = Vec::new();
     for row in 0..lengths.len() {
-        if count[row] != [lengths[row]] {
-            problems.push((row, format!("count is {:?}, but the episode has {} frames", count[row], lengths[row])));
+        if count.row(row) != [lengths[row]] {
+            problems.push((row, format!("count is {:?}, but the episode has {} frames", count.row(row), lengths[row])));
         }
-        let (min, mean, max, std) = (&min[row], &mean[row], &max[row], &std[row]);
+        let (min, mean, max, std) = (min.row(row), mean.row(row), max.row(row), std.row(row));
         let is_ordered = [mean.len(), max.len(), std.len()] == [min.len(); 3]
             && (0..min.len()).all(|at| in_order(&[min[at], mean[at], max[at]]) && std[at] >= 0.0);
         if !is_ordered {

@@ -1,20 +1,27 @@
 //! The scoping labels of an episode against the spans of its calls.
+//!
+//! Labels are many, so runs of them are held against what they should be by one comparison a column; single rows are
+//! looked at where it fails.
+
+use std::ops::Range;
+
+use arrow::buffer::{BooleanBuffer, ScalarBuffer};
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
+use crate::dataset::cursor::{Batch, Cursor, Rows};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::finding::Validation;
 use crate::table::{Columns, TableError};
-use crate::trace::ProgramCall;
+use crate::trace::{ProgramCall, Span};
 
 /// Every column of `ntp/scopes/`.
 pub(super) struct ScopeBatch {
-    episode_index: Vec<i64>,
-    call_id: Vec<i64>,
-    specification_frame: Vec<i64>,
-    label: Vec<i64>,
-    is_start: Vec<bool>,
-    is_end: Vec<bool>,
+    episode_index: ScalarBuffer<i64>,
+    call_id: ScalarBuffer<i64>,
+    specification_frame: ScalarBuffer<i64>,
+    label: ScalarBuffer<i64>,
+    is_start: BooleanBuffer,
+    is_end: BooleanBuffer,
 }
 
 impl Batch for ScopeBatch {
@@ -23,12 +30,12 @@ impl Batch for ScopeBatch {
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
-            episode_index: columns.int64("episode_index")?,
-            call_id: columns.int64("call_id")?,
-            specification_frame: columns.int64("specification_frame")?,
-            label: columns.int64("label")?,
-            is_start: columns.boolean("is_start")?,
-            is_end: columns.boolean("is_end")?,
+            episode_index: columns.numbers("episode_index")?,
+            call_id: columns.numbers("call_id")?,
+            specification_frame: columns.numbers("specification_frame")?,
+            label: columns.numbers("label")?,
+            is_start: columns.flags("is_start")?,
+            is_end: columns.flags("is_end")?,
         })
     }
 }
@@ -42,23 +49,15 @@ pub(super) fn check(
 ) -> Result<(), DatasetError> {
     let mut n_scopes = 0;
     for (call, output) in calls.iter().filter_map(|call| Some((call, call.output?))) {
-        for frame in call.input.begin..call.input.end {
-            let (batch, at) = cursor.next(row.scopes)?;
-            let ids = (batch.episode_index[at], batch.call_id[at], batch.specification_frame[at]);
-            let expected = (row.episode_index, i64::from(call.id.0), i64::from(frame));
-            if ids != expected {
-                let names = "(episode_index, call_id, specification_frame)";
-                return Err(cursor.problem(format!("{names} are {ids:?}, but should be {expected:?}")));
-            }
-            let found = (batch.label[at], batch.is_start[at], batch.is_end[at]);
-            let expected = (output.label(frame) as i64, frame == output.begin, frame == output.last());
-            if found != expected {
-                let message = format!("(label, is_start, is_end) are {found:?}, but the span makes them {expected:?}");
-                let place = format!("episode {}, call {}, frame {frame}", row.episode_index, call.id.0);
-                validation.error("scopes.label", &cursor.path(), place, message);
-            }
-            n_scopes += 1;
+        let mut begin = call.input.begin;
+        while begin < call.input.end {
+            let rows = cursor.next_rows(row.scopes, (call.input.end - begin) as usize)?;
+            let end = begin + rows.range.len() as u32;
+            let run = Run { episode: row.episode_index, call: i64::from(call.id.0), frames: begin..end, output };
+            run.check(&rows, validation)?;
+            begin = end;
         }
+        n_scopes += call.input.len() as i64;
     }
     validation.scopes += n_scopes as u64;
     if row.n_scopes != n_scopes {
@@ -67,4 +66,76 @@ pub(super) fn check(
         return Err(cursor.problem(problem));
     }
     Ok(())
+}
+
+/// What some rows of one call should be: labels of frames, one after another.
+struct Run {
+    episode: i64,
+    call: i64,
+    frames: Range<u32>,
+    output: Span,
+}
+
+impl Run {
+    fn check(&self, rows: &Rows<'_, ScopeBatch>, validation: &mut Validation) -> Result<(), DatasetError> {
+        if !self.has_ids(rows.batch, &rows.range) {
+            self.find_ids(rows)?;
+        }
+        if !self.has_labels(rows.batch, &rows.range) {
+            self.find_labels(rows, validation);
+        }
+        Ok(())
+    }
+
+    fn has_ids(&self, batch: &ScopeBatch, range: &Range<usize>) -> bool {
+        let frames = i64::from(self.frames.start)..;
+        let all = |column: &[i64], expected: i64| column.iter().fold(0, |found, id| found | (id ^ expected)) == 0;
+        all(&batch.episode_index[range.clone()], self.episode)
+            && all(&batch.call_id[range.clone()], self.call)
+            && batch.specification_frame[range.clone()].iter().zip(frames).fold(0, |found, (a, b)| found | (a ^ b)) == 0
+    }
+
+    fn find_ids(&self, rows: &Rows<'_, ScopeBatch>) -> Result<(), DatasetError> {
+        for (at, frame) in rows.range.clone().zip(self.frames.clone()) {
+            let batch = rows.batch;
+            let ids = (batch.episode_index[at], batch.call_id[at], batch.specification_frame[at]);
+            let expected = (self.episode, self.call, i64::from(frame));
+            if ids != expected {
+                let names = "(episode_index, call_id, specification_frame)";
+                return Err(rows.problem(at, format!("{names} are {ids:?}, but should be {expected:?}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn has_labels(&self, batch: &ScopeBatch, range: &Range<usize>) -> bool {
+        let labels = self.frames.clone().map(|frame| self.output.label(frame) as i64);
+        let differ = batch.label[range.clone()].iter().zip(labels).fold(0, |found, (a, b)| found | (a ^ b)) != 0;
+        !differ
+            && self.has_flag(&batch.is_start, range, self.output.begin)
+            && self.has_flag(&batch.is_end, range, self.output.last())
+    }
+
+    /// Whether one frame is flagged, if it is among the rows, and no other.
+    fn has_flag(&self, flags: &BooleanBuffer, range: &Range<usize>, frame: u32) -> bool {
+        let n_flags = flags.slice(range.start, range.len()).count_set_bits();
+        if !self.frames.contains(&frame) {
+            return n_flags == 0;
+        }
+        n_flags == 1 && flags.value(range.start + (frame - self.frames.start) as usize)
+    }
+
+    fn find_labels(&self, rows: &Rows<'_, ScopeBatch>, validation: &mut Validation) {
+        let Self { episode, call, output, .. } = self;
+        for (at, frame) in rows.range.clone().zip(self.frames.clone()) {
+            let batch = rows.batch;
+            let found = (batch.label[at], batch.is_start.value(at), batch.is_end.value(at));
+            let expected = (output.label(frame) as i64, frame == output.begin, frame == output.last());
+            if found != expected {
+                let message = format!("(label, is_start, is_end) are {found:?}, but the span makes them {expected:?}");
+                let place = format!("episode {episode}, call {call}, frame {frame}");
+                validation.error("scopes.label", &rows.path(), place, message);
+            }
+        }
+    }
 }

@@ -13,6 +13,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::edit::diff::digest::comparable;
 use crate::dataset::edit::diff::{ChangedEpisode, EpisodeName};
 use crate::dataset::edit::pieces::Piece;
+use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::Source;
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
 use crate::dataset::layout;
@@ -64,6 +65,7 @@ pub(super) fn details(before: &Path, after: &Path, pairs: &[(usize, usize)]) -> 
 
 fn contents(root: &Path, wanted: BTreeSet<usize>) -> Result<BTreeMap<usize, Content>, EditError> {
     let mut source = Source::open(root)?;
+    let mut videos = Samples::of_all(&source.info);
     let mut contents = BTreeMap::new();
     let mut at = 0;
     while let Some(episode) = source.next_episode()? {
@@ -72,12 +74,14 @@ fn contents(root: &Path, wanted: BTreeSet<usize>) -> Result<BTreeMap<usize, Cont
             let columns = |pieces: &[Piece]| {
                 columns(pieces, &source.subtasks).map_err(EditError::rows(source.root().join(layout::EPISODES)))
             };
+            let videos = videos.iter_mut().map(|video| video.column(&episode, &source));
+            let frames = columns(&pieces.frames)?.into_iter().map(Ok).chain(videos);
             let content = Content {
                 name: name_of(&episode.row),
                 provenance: columns(&pieces.provenance)?,
                 calls: columns(&pieces.calls)?,
                 scopes: columns(&pieces.scopes)?,
-                frames: columns(&pieces.frames)?,
+                frames: frames.collect::<Result<_, _>>()?,
             };
             contents.insert(at, content);
         }

@@ -12,6 +12,7 @@ use arrow::row::{RowConverter, SortField};
 
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::pieces::Piece;
+use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::layout;
@@ -41,10 +42,12 @@ pub(super) struct EpisodeDigest {
 /// The hashes of all episodes in order.
 pub(super) fn digests(root: &Path) -> Result<Vec<EpisodeDigest>, EditError> {
     let mut source = Source::open(root)?;
+    let mut videos = Samples::of_all(&source.info);
     let mut digests = Vec::new();
     while let Some(episode) = source.next_episode()? {
         let failed = EditError::rows(source.root().join(layout::EPISODES));
-        let content = content(&episode, &source.subtasks).map_err(failed)?;
+        let videos = videos.iter_mut().map(|video| video.column(&episode, &source)).collect::<Result<Vec<_>, _>>()?;
+        let content = content(&episode, &source.subtasks, &videos).map_err(failed)?;
         digests.push(EpisodeDigest { identity: identity(&episode.row), content });
     }
     Ok(digests)
@@ -65,13 +68,16 @@ fn identity(row: &EpisodeRow) -> [u64; 2] {
     [hash(0), hash(1)]
 }
 
-fn content(episode: &SourceEpisode, subtasks: &[String]) -> Result<u64, ArrowError> {
+fn content(episode: &SourceEpisode, subtasks: &[String], videos: &[(String, ArrayRef)]) -> Result<u64, ArrowError> {
     let mut hasher = DefaultHasher::new();
     let pieces = &episode.pieces;
     for table in [&pieces.provenance, &pieces.calls, &pieces.scopes, &pieces.frames] {
         for rows in table.iter().map(Piece::rows) {
             hash_rows(&comparable(&rows, subtasks)?, &mut hasher)?;
         }
+    }
+    if !videos.is_empty() {
+        hash_rows(videos, &mut hasher)?;
     }
     Ok(hasher.finish())
 }

@@ -19,14 +19,15 @@ impl Target {
         let slots = self.slots.take().unwrap_or_default();
         write_json(&self.root.join(layout::INFO), &self.info(&slots))?;
         write_json(&self.root.join(layout::NTP_INFO), &self.ntp_info(slots, failed_left_out))?;
-        let Self { root, tasks, statistics, mut summary, .. } = self;
+        let Self { root, tasks, statistics, pictures, mut summary, .. } = self;
         let single = [layout::INFO, layout::STATS, layout::TASKS, layout::SUBTASKS, layout::NTP_INFO, layout::EPISODES];
         let mut files: Vec<String> = single.map(ToOwned::to_owned).into();
         for table in [self.frame_files, self.call_files, self.scope_files, self.meta_files] {
             files.extend(table.finish()?);
         }
         self.provenance_file.commit()?;
-        write_json(&root.join(layout::STATS), &Stats(statistics.finish()?, Vec::new()))?;
+        write_json(&root.join(layout::STATS), &Stats(statistics.finish()?, pictures.statistics()))?;
+        files.extend(pictures.finish()?);
         files.sort_unstable();
         summary.tasks = tasks.texts().len() as u64;
         summary.files = files;

@@ -1,0 +1,166 @@
+//! Where publications are: a folder, or a bucket of an object store.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use crate::publish::PublishError;
+use crate::publish::folder::Folder;
+
+/// A place that holds the files of one publication. Files are named relative to it, with `/`.
+pub trait Destination {
+    /// A file's name in messages.
+    fn path(&self, file: &str) -> PathBuf;
+
+    /// Every file, in order; none where nothing is there yet. Files on their way are not told.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot be listed.
+    fn list(&self) -> Result<Vec<String>, PublishError>;
+
+    /// A small file; `None` when it is not there.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read.
+    fn read(&self, file: &str) -> Result<Option<Vec<u8>>, PublishError>;
+
+    /// The SHA-256 of what is stored under a name, read back; `None` when nothing is.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read.
+    fn sha256(&self, file: &str) -> Result<Option<String>, PublishError>;
+
+    /// Makes ready for files, and removes what a killed process left half-written.
+    ///
+    /// # Errors
+    ///
+    /// [`PublishError::NoConditionalWrites`] for a bucket without them; when nothing can be written.
+    fn prepare(&self) -> Result<(), PublishError>;
+
+    /// Stores a file that lies in a folder, whole or not at all. Nothing of its name is there.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read or stored.
+    fn copy(&self, source: &Path, file: &str) -> Result<(), PublishError>;
+
+    /// Stores some bytes, whole or not at all, unless there is something of the name by then.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot be stored.
+    fn create(&self, file: &str, content: &[u8]) -> Result<Creation, PublishError>;
+
+    /// The folder that it is, if it is one.
+    fn folder(&self) -> Option<&Path> {
+        None
+    }
+}
+
+/// What became of bytes that were to be stored under a new name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Creation {
+    /// They are stored.
+    Stored,
+    /// There is something of this name.
+    Taken,
+}
+
+/// Where a publication is, as it is written on the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A folder.
+    Folder(PathBuf),
+    /// A place in a bucket of an S3-compatible store.
+    Bucket(BucketUrl),
+}
+
+/// `s3://BUCKET[/PREFIX]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BucketUrl {
+    /// The bucket's name.
+    pub bucket: String,
+    /// What the names of all files begin with, without `/` at its ends; empty for none.
+    pub prefix: String,
+}
+
+/// A text is no place.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{found:?} is no place for a publication; allowed: a folder, or s3://BUCKET[/PREFIX] without . and .. in it")]
+pub struct NoPlace {
+    found: String,
+}
+
+impl FromStr for Place {
+    type Err = NoPlace;
+
+    fn from_str(text: &str) -> Result<Self, NoPlace> {
+        let wrong = || NoPlace { found: text.to_owned() };
+        let Some((scheme, rest)) = text.split_once("://") else {
+            return if text.is_empty() { Err(wrong()) } else { Ok(Self::Folder(text.into())) };
+        };
+        let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
+        let prefix = prefix.trim_end_matches('/');
+        let is_name = |part: &str| !["", ".", ".."].contains(&part) && !part.chars().any(char::is_control);
+        let is_bucket = is_name(bucket) && bucket.chars().all(|c| c.is_ascii_alphanumeric() || "-._".contains(c));
+        if scheme != "s3" || !is_bucket || !(prefix.is_empty() || prefix.split('/').all(is_name)) {
+            return Err(wrong());
+        }
+        Ok(Self::Bucket(BucketUrl { bucket: bucket.to_owned(), prefix: prefix.to_owned() }))
+    }
+}
+
+impl fmt::Display for BucketUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let slash = if self.prefix.is_empty() { "" } else { "/" };
+        write!(f, "s3://{}{slash}{}", self.bucket, self.prefix)
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Folder(path) => write!(f, "{}", path.display()),
+            Self::Bucket(url) => write!(f, "{url}"),
+        }
+    }
+}
+
+impl Place {
+    /// Opens it. A bucket's address and keys are taken from the environment, as programs for such stores do.
+    ///
+    /// # Errors
+    ///
+    /// [`PublishError::NoCloud`] for a bucket when the program was built without the feature `cloud`; when settings in
+    /// the environment contradict each other.
+    pub fn open(&self) -> Result<Box<dyn Destination>, PublishError> {
+        match self {
+            Self::Folder(path) => Ok(Box::new(Folder::new(path))),
+            #[cfg(feature = "cloud")]
+            Self::Bucket(url) => Ok(Box::new(crate::publish::Bucket::from_env(url)?)),
+            #[cfg(not(feature = "cloud"))]
+            Self::Bucket(url) => Err(PublishError::NoCloud { url: url.to_string() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BucketUrl, Place};
+
+    #[test]
+    fn a_place_is_a_folder_or_a_bucket_with_a_prefix() {
+        let bucket =
+            |bucket: &str, prefix: &str| Place::Bucket(BucketUrl { bucket: bucket.into(), prefix: prefix.into() });
+        assert_eq!("data/published".parse(), Ok(Place::Folder("data/published".into())));
+        assert_eq!("s3://robots".parse(), Ok(bucket("robots", "")));
+        assert_eq!("s3://robots/a/b/".parse(), Ok(bucket("robots", "a/b")));
+        assert_eq!(bucket("robots", "a/b").to_string(), "s3://robots/a/b");
+        for wrong in ["", "s3://", "s3:///a", "s3://a b", "s3://robots/a/../b", "s3://robots//a", "gs://robots"] {
+            assert!(wrong.parse::<Place>().is_err(), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Arrow arrays as columns: copied into vectors, or taken as they lie in memory.
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray};
+use arrow::buffer::{BooleanBuffer, OffsetBuffer, ScalarBuffer};
+use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
+
+use crate::table::{Column, ColumnKind, Columns, Form, TableError, Value};
+
+/// Lists of numbers one after another, as they lie in a batch.
+#[derive(Clone, Debug)]
+pub(crate) struct ListRows<T: ArrowNativeType> {
+    values: ScalarBuffer<T>,
+    borders: OffsetBuffer<i32>,
+}
+
+impl<T: ArrowNativeType> ListRows<T> {
+    /// The values of a row.
+    pub(crate) fn row(&self, at: usize) -> &[T] {
+        &self.values[self.borders[at] as usize..self.borders[at + 1] as usize]
+    }
+}
+
+/// Lists of floats.
+pub(crate) type FloatRows = ListRows<f32>;
+
+/// Texts one after another, as they lie in a batch.
+#[derive(Clone, Debug)]
+pub(crate) struct TextRows(StringArray);
+
+impl TextRows {
+    /// The text of a row; empty where there is none.
+    pub(crate) fn row(&self, at: usize) -> &str {
+        self.0.value(at)
+    }
+
+    /// The text of a row that may have none.
+    pub(crate) fn get(&self, at: usize) -> Option<&str> {
+        self.0.is_valid(at).then(|| self.0.value(at))
+    }
+}
+
+/// Columns of a batch without a copy. The errors are those of the other takers.
+impl Columns {
+    /// Takes whole numbers out.
+    pub(crate) fn numbers(&mut self, name: &str) -> Result<ScalarBuffer<i64>, TableError> {
+        let expected = ColumnKind { value: Value::Int64, form: Form::Required };
+        self.take_array(name, expected, |_, array| Some(array.as_primitive_opt::<Int64Type>()?.values().clone()))
+    }
+
+    /// Takes flags out, a bit each.
+    pub(crate) fn flags(&mut self, name: &str) -> Result<BooleanBuffer, TableError> {
+        let expected = ColumnKind { value: Value::Boolean, form: Form::Required };
+        self.take_array(name, expected, |_, array| Some(array.as_boolean_opt()?.values().clone()))
+    }
+
+    /// Takes texts out, of which some rows may have none.
+    pub(crate) fn text_rows(&mut self, name: &str, form: Form) -> Result<TextRows, TableError> {
+        let expected = ColumnKind { value: Value::Text, form };
+        self.take_array(name, expected, |_, array| Some(TextRows(array.as_string_opt::<i32>()?.clone())))
+    }
+
+    /// Takes lists of floats out.
+    pub(crate) fn float_rows(&mut self, name: &str) -> Result<FloatRows, TableError> {
+        self.list_rows::<Float32Type>(name, Value::Float32)
+    }
+
+    /// Takes lists of doubles out.
+    pub(crate) fn double_rows(&mut self, name: &str) -> Result<ListRows<f64>, TableError> {
+        self.list_rows::<Float64Type>(name, Value::Float64)
+    }
+
+    /// Takes lists of whole numbers out.
+    pub(crate) fn number_rows(&mut self, name: &str) -> Result<ListRows<i64>, TableError> {
+        self.list_rows::<Int64Type>(name, Value::Int64)
+    }
+
+    fn list_rows<T: ArrowPrimitiveType>(
+        &mut self,
+        name: &str,
+        value: Value,
+    ) -> Result<ListRows<T::Native>, TableError> {
+        self.take_array(name, ColumnKind { value, form: Form::List }, |_, array| {
+            let list = array.as_list_opt::<i32>()?;
+            let values = list.values().as_primitive_opt::<T>()?.values().clone();
+            Some(ListRows { values, borders: list.offsets().clone() })
+        })
+    }
+}
+
+/// Appends the rows of an array; `None` when it is of another kind.
+pub(super) fn append_array(column: &mut Column, array: &ArrayRef) -> Option<()> {
+    match column {
+        Column::Int64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Int64Type>()?.values()),
+        Column::OptionalInt64(rows) => rows.extend(array.as_primitive_opt::<Int64Type>()?),
+        Column::Float32(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float32Type>()?.values()),
+        Column::OptionalFloat32(rows) => rows.extend(array.as_primitive_opt::<Float32Type>()?),
+        Column::Float64(rows) => rows.extend_from_slice(array.as_primitive_opt::<Float64Type>()?.values()),
+        Column::OptionalFloat64(rows) => rows.extend(array.as_primitive_opt::<Float64Type>()?),
+        Column::Boolean(rows) => rows.extend(array.as_boolean_opt()?.values()),
+        Column::Text(rows) => {
+            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.unwrap_or_default().to_owned()));
+        }
+        Column::OptionalText(rows) => {
+            rows.extend(array.as_string_opt::<i32>()?.iter().map(|text| text.map(ToOwned::to_owned)));
+        }
+        Column::Int64List(rows) => append_list::<Int64Type>(rows, array)?,
+        Column::Float32List(rows) => append_list::<Float32Type>(rows, array)?,
+        Column::Float64List(rows) => append_list::<Float64Type>(rows, array)?,
+        Column::TextList(rows) => {
+            let list = array.as_list_opt::<i32>()?;
+            let values = list.values().as_string_opt::<i32>()?;
+            let row = |ends: &[i32]| (ends[0]..ends[1]).map(|at| values.value(at as usize).to_owned()).collect();
+            rows.extend(list.offsets().windows(2).map(row));
+        }
+    }
+    Some(())
+}
+
+fn append_list<T: ArrowPrimitiveType>(rows: &mut Vec<Vec<T::Native>>, array: &ArrayRef) -> Option<()> {
+    let list = array.as_list_opt::<i32>()?;
+    let values = list.values().as_primitive_opt::<T>()?.values();
+    rows.extend(list.offsets().windows(2).map(|ends| values[ends[0] as usize..ends[1] as usize].to_vec()));
+    Some(())
+}
