@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use arrow::array::{AsArray as _, RecordBatch};
+use arrow::array::{Array as _, AsArray as _, RecordBatch};
 use arrow::datatypes::{ArrowPrimitiveType, Int64Type};
 use mcap::MessageStream;
 use ntp::artifact::read_json;
