@@ -193,7 +193,7 @@ impl Detector for PointDetector {
 
     fn acquainted(mut self, sample: &PictureSample, rows: &[f32], seed: Seed) -> Self {
         self.perception = self.perception.acquainted(sample, seed);
-        let looks = self.perception.look(&sample.pictures);
+        let (looks, ()) = self.perception.look(&sample.pictures);
         let [_, n_colours, width] = looks.dims();
         let looks: Vec<f32> = looks.into_data().try_into_vec().unwrap_or_default();
         let colours = colours_of_slots(&looks, [n_colours, width], rows, self.n_slots);

@@ -10,7 +10,7 @@ use burn::nn::conv::Conv2d;
 use burn::nn::pool::MaxPool2dConfig;
 use burn::nn::{Linear, PaddingConfig2d};
 use burn::tensor::activation::relu;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::detector::Detector;
@@ -73,12 +73,9 @@ impl Detector for VggDetector {
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let values: Vec<f32> = pictures.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
-        let shape = [pictures.n, pictures.height, pictures.width, 3];
-        let device = self.positions.weight.device();
-        let rows = Tensor::<4>::from_data(TensorData::new(values, shape), &device);
+        let pixels = pictures.to_tensor(&self.positions.weight.device());
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
-        let seen = self.blocks.iter().fold(rows.permute([0, 3, 1, 2]), |seen, block| {
+        let seen = self.blocks.iter().fold(pixels, |seen, block| {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
             pool.forward(seen)
         });
