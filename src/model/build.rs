@@ -10,6 +10,7 @@ use crate::model::detector::{Detector, PointDetector, VggDetector};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::{FlatEncoder, Flattened};
 use crate::model::instructed::Instructed;
+use crate::model::keypoints::Keypoints;
 use crate::model::layers::Init;
 use crate::model::network::Network;
 use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
@@ -53,6 +54,9 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
         }
         NetworkConfig::Convolved(widths) => {
             wanted.run(Ntp::<FlatEncoder<Convolved>>::new(widths, config.n_slots, seed, device))
+        }
+        NetworkConfig::Keypoints(widths) => {
+            wanted.run(Ntp::<Sighted<Keypoints>>::new(widths, config.n_slots, seed, device))
         }
         NetworkConfig::Detected(detector, widths) => wanted.run_detecting(detecting::<PointDetector, ObjectCentric>(
             detector,

@@ -33,6 +33,7 @@ use crate::model::colour_slots::foreground::{COLOUR_WIDTH, Foreground, backgroun
 use crate::model::layers::Init;
 use crate::model::perception::Perception;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::sighted::PerceptNaming;
 use crate::seed::Seed;
 
 /// A score that no softmax lets through.
@@ -117,6 +118,8 @@ impl ColourSlots {
 
 impl Perception for ColourSlots {
     type Config = ColourSlotsConfig;
+    type Looks = ();
+    type Naming = PerceptNaming;
 
     fn new(config: &ColourSlotsConfig, init: &mut Init) -> Self {
         let log_sharpness = init.filled([1, config.colours], SHARPNESS.ln());
@@ -148,7 +151,7 @@ impl Perception for ColourSlots {
         self
     }
 
-    fn look(&self, pictures: &Pictures) -> Tensor<3> {
+    fn look(&self, pictures: &Pictures) -> (Tensor<3>, ()) {
         let seen = foreground(pictures, &self.background());
         let scores = self.scores(&seen);
         let places = TensorData::new(seen.places(), [seen.n_pictures, 2, seen.n_points]);
@@ -159,7 +162,7 @@ impl Perception for ColourSlots {
         let variances = (squares - centres.clone().powf_scalar(2.0)).sum_dim(1).clamp_min(0.0); // [F, 1, K]
         let full = MASS_PIXELS * (pictures.width * pictures.height) as f32;
         let masses = scores.exp().sum_dim(1) / full;
-        Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2)
+        (Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2), ())
     }
 }
 

@@ -79,6 +79,7 @@ impl Training {
             EncoderKind::ObjectCentric => (1000, 0.003, 0.0, 0.2, 0.25),
             EncoderKind::Flattened => (3000, 0.002, 1.0, 0.0, 0.0),
             EncoderKind::ColourSlots => (2000, 0.003, 0.0, 0.0, 0.0),
+            EncoderKind::Keypoints => (3000, 0.002, 0.0, 0.0, 0.0),
             EncoderKind::Convolved | EncoderKind::DetectedFlattened => (3000, 0.001, 0.0, 0.0, 0.0),
             EncoderKind::Detected => (2000, 0.003, 0.0, 0.2, 0.25),
         };

@@ -38,12 +38,7 @@ struct Eyes {
 }
 
 const EYES: [Eyes; 3] = [
-    Eyes {
-        name: "colour slots",
-        state: "ntp",
-        end_to_end: "ntp_vid_e2e",
-        detector: Some("ntp_vid_detector"),
-    },
+    Eyes { name: "colour slots", state: "ntp", end_to_end: "ntp_vid_e2e", detector: Some("ntp_vid_detector") },
     Eyes {
         name: "the paper's convolutions",
         state: "ntp_paper",
