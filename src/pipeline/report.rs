@@ -168,7 +168,8 @@ fn seen(camera: &CameraConfig) -> String {
     let CameraConfig { size_px: [width, height], randomize, .. } = camera;
     let Randomization { light, color, camera_m, camera_rad, one_color } = randomize;
     let mut words = format!("{width} x {height} pixels");
-    let shares = [("light", light, ""), ("colours", color, ""), ("place", camera_m, " m"), ("angle", camera_rad, " rad")];
+    let shares =
+        [("light", light, ""), ("colours", color, ""), ("place", camera_m, " m"), ("angle", camera_rad, " rad")];
     for (what, most, unit) in shares.into_iter().filter(|(_, most, _)| **most > 0.0) {
         words.push_str(&format!(", {what} changed by up to {most}{unit}"));
     }

@@ -69,9 +69,8 @@ pub(super) fn draw_seen(
     sizes: &[(usize, usize)],
     seed: Seed,
 ) -> Result<Vec<Group>, TrainError> {
-    let mut drawn: Vec<Vec<Vec<Example>>> = (0..GROUPS)
-        .map(|group| draw_group(examples, config, sizes, &mut group_seed(seed, group).rng()))
-        .collect();
+    let mut drawn: Vec<Vec<Vec<Example>>> =
+        (0..GROUPS).map(|group| draw_group(examples, config, sizes, &mut group_seed(seed, group).rng())).collect();
     let mut groups: Vec<Shown> = drawn.iter().map(|group| Shown::new(group.iter().flatten())).collect();
     let mut parts: Vec<Group> =
         groups.iter_mut().map(|shown| shown.group(examples, gallery)).collect::<Result<_, _>>()?;

@@ -45,7 +45,10 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     let scene = layout.split(ContainerKind::Horizontal, &[scene, cameras], &[0.68, 0.32])?;
     let paired = replays.iter().any(|replay| replay.demonstration.is_some());
     let (name, contents): (&str, &[&str]) = if paired {
-        ("Running programs, and those of the demonstration", &["/agreement", "/adversary", "/programs/**", "/programs_of_expert/**"])
+        (
+            "Running programs, and those of the demonstration",
+            &["/agreement", "/adversary", "/programs/**", "/programs_of_expert/**"],
+        )
     } else {
         ("Running programs", &["/adversary", "/programs/**"])
     };

@@ -86,7 +86,9 @@ fn facts(replay: &Replay<'_>) -> Vec<(&'static str, String)> {
 fn pushes_in_words(episode: &Episode) -> Option<String> {
     let n_toppled: usize = episode.pushes.iter().map(|push| push.toppled.len()).sum();
     let plural = |count: usize, one: &str, several: &str| format!("{count} {}", if count == 1 { one } else { several });
-    let told = || format!("{}, {} toppled", plural(episode.pushes.len(), "push", "pushes"), plural(n_toppled, "body", "bodies"));
+    let told = || {
+        format!("{}, {} toppled", plural(episode.pushes.len(), "push", "pushes"), plural(n_toppled, "body", "bodies"))
+    };
     (!episode.pushes.is_empty()).then(told)
 }
 

@@ -150,10 +150,7 @@ fn a_learner_reads_what_the_episodes_hold() {
 fn frames_between_boundaries_change_nothing_for_a_learner() {
     let sparse = episodes();
     let dense: Vec<Episode> = sparse.iter().map(|episode| densify(episode, 3)).collect();
-    assert_eq!(
-        expected_trials(&dense, FrameChoice::Boundaries),
-        expected_trials(&sparse, FrameChoice::Boundaries)
-    );
+    assert_eq!(expected_trials(&dense, FrameChoice::Boundaries), expected_trials(&sparse, FrameChoice::Boundaries));
     for frames in [FrameChoice::Boundaries, FrameChoice::All] {
         let folder = tempfile::tempdir().unwrap();
         let summary = convert_all(&dense, &config(frames), folder.path()).unwrap();

@@ -93,7 +93,10 @@ fn check_in(form: SpecificationForm, variants: &[Variant], (hidden, label, slot)
     for &variant in variants {
         let said = say(variant, form);
         let key = 0.1 * hidden + 0.1;
-        assert!(near(said.hidden, hidden) && near(said.end, key) && near(said.program, 0.1 * key), "{variant}: {said:?}");
+        assert!(
+            near(said.hidden, hidden) && near(said.end, key) && near(said.program, 0.1 * key),
+            "{variant}: {said:?}"
+        );
         assert_eq!(said.label.is_some(), label.is_some(), "{variant}");
         let label_is_near = said.label.zip(label).is_none_or(|(found, expected)| near(found, expected));
         assert!(label_is_near && near(said.slot, slot), "{variant}: {said:?}");

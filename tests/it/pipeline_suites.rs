@@ -90,10 +90,15 @@ fn imported_tasks_run_through_every_stage_and_suite() {
         assert_eq!(of_oracle(suite)["pushes"], Value::Null, "{suite} has no adversary");
     }
     let tasks_of = |variant: &str, suite: &str| {
-        let sql = format!("SELECT task_id FROM rollouts WHERE variant = '{variant}' AND suite = '{suite}' ORDER BY episode");
+        let sql =
+            format!("SELECT task_id FROM rollouts WHERE variant = '{variant}' AND suite = '{suite}' ORDER BY episode");
         let (_, rows, _) = ntp(&["query", &out.to_string_lossy(), &sql, "--json"]);
         let rows: Value = serde_json::from_str(&rows).unwrap();
-        let ids = rows.as_array().unwrap().iter().map(|row| row["task_id"].as_str().unwrap().trim_start_matches("authors_").to_owned());
+        let ids = rows
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| row["task_id"].as_str().unwrap().trim_start_matches("authors_").to_owned());
         ids.collect::<Vec<_>>().join(" ")
     };
     assert_eq!(tasks_of("ntp", "stacking_topology"), "0 1 0 1", "seen are those that the model was trained on");

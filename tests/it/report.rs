@@ -273,8 +273,12 @@ fn a_tagged_model_is_told_apart_and_stands_for_no_model_of_the_paper() {
         .iter()
         .map(|row| (row.actor.variant.as_str(), row.actor.tag.as_deref(), row.successes, row.paper_success_rate))
         .collect();
-    let expected =
-        [("ntp", None, 7, Some(0.863)), ("ntp", Some("adaptive"), 8, None), ("flat", None, 0, None), ("flat", Some("adaptive"), 2, None)];
+    let expected = [
+        ("ntp", None, 7, Some(0.863)),
+        ("ntp", Some("adaptive"), 8, None),
+        ("flat", None, 0, None),
+        ("flat", Some("adaptive"), 2, None),
+    ];
     assert_eq!(told, expected);
     assert!(report.claims.iter().all(|claim| !claim.ours.contains("1.000")), "{:?}", report.claims);
     assert!(run.text("report.md").contains("| ntp (adaptive) "));
@@ -288,7 +292,8 @@ fn pushes_and_what_they_toppled_stand_on_the_page() {
     let page = run.text("index.html");
     let (_, table) = page.split_once("what the adversary did, and what toppled").unwrap();
     // Of `ntp` alone: 13 pushes in 8 rollouts, 26 bodies.
-    for cell in ["<td class=\"n\">13</td><td class=\"n\">1.62</td>", "<td class=\"n\">26</td><td class=\"n\">2.00</td>"] {
+    for cell in ["<td class=\"n\">13</td><td class=\"n\">1.62</td>", "<td class=\"n\">26</td><td class=\"n\">2.00</td>"]
+    {
         assert!(table.contains(cell), "{cell}");
     }
 }
@@ -296,7 +301,8 @@ fn pushes_and_what_they_toppled_stand_on_the_page() {
 #[test]
 fn force_becomes_a_figure_when_it_is_swept() {
     let suites = ["stacking_unseen", "stacking_adversary", "stacking_adversary_030_mns", "stacking_adversary_120_mns"];
-    let rows: Vec<Vec<Rollout>> = suites.iter().zip([20, 16, 19, 10]).map(|(suite, n)| rollouts("ntp", suite, n, 20)).collect();
+    let rows: Vec<Vec<Rollout>> =
+        suites.iter().zip([20, 16, 19, 10]).map(|(suite, n)| rollouts("ntp", suite, n, 20)).collect();
     let figures = Run::new(&rows.concat()).make().figures;
     let force = figures.iter().find(|figure| figure.id == "stacking_adversary_force").unwrap();
     let points: Vec<_> = force.series[0].ours.iter().map(|point| (point.x, point.success_rate)).collect();

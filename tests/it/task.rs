@@ -420,9 +420,10 @@ fn two_thousand_tasks_in_the_authors_form_come_back_as_they_were_split_at_a_thou
     let ours = sample(Family::BlockStacking, 1000, 1000, Seed(3)).unwrap();
     let cube = |slot: SlotIndex| format!("cube_{}", slot.0);
     let entry = |task: &Task| {
-        let goals = task.goals.iter().map(|goal| {
-            json!({"name": "pick_place", "src": cube(goal.source), "target": cube(goal.target)})
-        });
+        let goals = task
+            .goals
+            .iter()
+            .map(|goal| json!({"name": "pick_place", "src": cube(goal.source), "target": cube(goal.target)}));
         let ends = task.conditions.iter().map(|condition| match *condition {
             Condition::OnTop { upper, lower } => json!({"type": "on_top", "src": cube(upper), "target": cube(lower)}),
             Condition::Inside { .. } => panic!("blocks lie in nothing"),

@@ -76,9 +76,7 @@ fn pushes_follow_one_another_from_a_frame_to_a_later_boundary() {
     check(vec![Push { toppled: vec![BodyIndex(9)], ..push(0, 2) }], |problem| {
         matches!(problem, PushProblem::Body { body: 9, .. })
     });
-    check(vec![Push { impulse_ns: [0.0, f32::NAN, 0.0], ..push(0, 2) }], |problem| {
-        *problem == PushProblem::NotFinite
-    });
+    check(vec![Push { impulse_ns: [0.0, f32::NAN, 0.0], ..push(0, 2) }], |problem| *problem == PushProblem::NotFinite);
     check_refused(
         |parts| {
             parts.frames[2].boundary = false;

@@ -315,8 +315,7 @@ fn a_push_is_an_arrow_a_lane_and_a_line_until_all_rests() {
     let component = rerun::Arrows3D::descriptor_origins().component;
     let origins: Vec<Option<[f32; 3]>> =
         arrow.iter_slices::<[f32; 3]>(component).map(|row| row.first().copied()).collect();
-    let stood: [f32; 3] =
-        episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
+    let stood: [f32; 3] = episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
     assert_eq!(origins, [Some(stood), None]);
     let log = temporal(read.only(), "/calls");
     let lines = log.iter_slices::<String>(rerun::TextLog::descriptor_text().component);
@@ -403,7 +402,10 @@ fn probabilities_are_those_of_the_decisions() {
 #[test]
 fn the_same_replays_give_the_same_bytes() {
     let (expert, shown, acted) = replays_of_a_tower();
-    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }];
+    let replays = [
+        Replay::from(&expert),
+        Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] },
+    ];
     let (first, second) = (read_back(&replays), read_back(&replays));
     let (first, second) = (std::fs::read(&first.path).unwrap(), std::fs::read(&second.path).unwrap());
     let first_difference = first.iter().zip(&second).position(|(a, b)| a != b);

@@ -71,8 +71,7 @@ impl EpisodePictures {
         };
         let is_video = declared.dtype == Dtype::Video;
         let episodes = places(root, &feature, is_video, f64::from(info.fps), info.total_episodes)?;
-        let files =
-            if is_video { Files::Videos(OpenFiles::default()) } else { Files::Images(OpenFiles::default()) };
+        let files = if is_video { Files::Videos(OpenFiles::default()) } else { Files::Images(OpenFiles::default()) };
         Ok(Self { root: root.to_owned(), feature, size_px: [width as u32, height as u32], episodes, files })
     }
 
@@ -133,7 +132,8 @@ impl EpisodePictures {
                 }
             }
             Files::Videos(files) => {
-                let file = files.get(place.file, || Mp4Reader::open(&path)).map_err(|error| wrong(error.to_string()))?;
+                let file =
+                    files.get(place.file, || Mp4Reader::open(&path)).map_err(|error| wrong(error.to_string()))?;
                 let mut video = Mp4Pictures::new(file).map_err(|error| wrong(error.to_string()))?;
                 for &row in rows {
                     let picture = video.get(place.first.saturating_add(row as usize)).map_err(wrong_row(row))?;
