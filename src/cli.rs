@@ -331,8 +331,8 @@ pub struct ImportArgs {
 pub struct ExportArgs {
     /// The dataset.
     pub dataset: PathBuf,
-    /// In which shape: `subtask_index` (a `LeRobotDataset` without what is ours), sarm (the same with SARM's columns),
-    /// behavior (BEHAVIOR-1K's annotation files) or foxglove (`foxglove.Event` messages in an MCAP file).
+    /// In which shape: `subtask_index` (a `LeRobotDataset` without what is ours), language (the same with `LeRobot`'s
+    /// language columns), sarm (the same with SARM's columns), behavior (BEHAVIOR-1K's annotation files) or foxglove (`foxglove.Event` messages in an MCAP file).
     #[arg(long, value_name = "FORM")]
     pub labels: LabelForm,
     /// The new folder, or with foxglove the new file.

@@ -15,6 +15,7 @@
 mod convert;
 mod costs;
 mod demonstration;
+mod detections;
 mod error;
 mod eye;
 mod gallery;

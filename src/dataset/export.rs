@@ -14,6 +14,7 @@
 mod behavior;
 mod events;
 mod labels;
+mod language;
 mod plain;
 mod sarm;
 
@@ -24,7 +25,7 @@ use serde::Serialize;
 use crate::artifact::StagedDir;
 use crate::dataset::edit::EditError;
 
-pub(in crate::dataset) use plain::{copy_files, with_columns};
+pub(in crate::dataset) use plain::{copy_files, copy_folder, with_columns};
 
 /// What labels are written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -32,7 +33,9 @@ pub(in crate::dataset) use plain::{copy_files, with_columns};
 pub enum LabelForm {
     /// A `LeRobotDataset` with the column `subtask_index` and `meta/subtasks.parquet`, and nothing of ours.
     SubtaskIndex,
-    /// The same with SARM's columns in `meta/episodes` and `meta/temporal_proportions_{sparse,dense}.json`.
+    /// The same with `LeRobot`'s language columns: what goes on at each moment, in words.
+    Language,
+    /// The same as `SubtaskIndex` with SARM's columns in `meta/episodes` and `meta/temporal_proportions_{sparse,dense}.json`.
     Sarm,
     /// BEHAVIOR-1K's `annotations/task-XXXX/episode_XXXXXXXX.json`.
     Behavior,
@@ -46,10 +49,11 @@ impl std::str::FromStr for LabelForm {
     fn from_str(word: &str) -> Result<Self, String> {
         match word {
             "subtask_index" => Ok(Self::SubtaskIndex),
+            "language" => Ok(Self::Language),
             "sarm" => Ok(Self::Sarm),
             "behavior" => Ok(Self::Behavior),
             "foxglove" => Ok(Self::Foxglove),
-            _ => Err(format!("unknown form {word:?}; allowed: subtask_index, sarm, behavior, foxglove")),
+            _ => Err(format!("unknown form {word:?}; allowed: subtask_index, language, sarm, behavior, foxglove")),
         }
     }
 }
@@ -82,6 +86,7 @@ pub fn export(root: &Path, form: LabelForm, to: &Path) -> Result<ExportSummary, 
     let staged = StagedDir::begin(to)?;
     let summary = match form {
         LabelForm::SubtaskIndex => plain::write(root, staged.partial_path())?,
+        LabelForm::Language => language::write(root, staged.partial_path())?,
         LabelForm::Sarm => sarm::write(root, staged.partial_path())?,
         LabelForm::Behavior | LabelForm::Foxglove => behavior::write(root, staged.partial_path())?,
     };

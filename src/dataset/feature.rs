@@ -20,7 +20,9 @@ pub(crate) enum Dtype {
     Image,
     /// Pictures in video files beside the tables.
     Video,
-    /// Of others: language and numbers of other sizes.
+    /// Rows of text in a column.
+    Language,
+    /// Of others: numbers of other sizes.
     #[serde(other)]
     Other,
 }
@@ -95,6 +97,6 @@ impl Feature {
 
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
-        !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other)
+        !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other)
     }
 }

@@ -24,8 +24,9 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::artifact::{IoError, StagedDir, create_dir, read_json, sha256_bytes, write_json};
+use crate::artifact::{IoError, StagedDir, read_json, sha256_bytes, write_json};
 use crate::dataset::edit::EditError;
+use crate::dataset::export::copy_folder;
 use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::layout;
 use crate::dataset::text_files::{write_subtasks, write_tasks};
@@ -79,7 +80,7 @@ pub fn import(root: &Path, to: &Path) -> Result<ImportSummary, EditError> {
     }
     write_texts(root, folder, &tasks, &subtasks)?;
     write_infos(root, folder, info, &subtasks, summary)?;
-    copy_folder(&root.join("videos"), &folder.join("videos"))?;
+    copy_folder(&root.join(layout::VIDEOS), &folder.join(layout::VIDEOS))?;
     staged.commit()?;
     Ok(summary)
 }
@@ -146,22 +147,4 @@ fn write_infos(
         annotated_by: Some(ANNOTATED_BY.to_owned()),
     };
     Ok(write_json(&to.join(layout::NTP_INFO), &ntp)?)
-}
-
-/// Copies a folder with all that is in it, where it is there.
-fn copy_folder(from: &Path, to: &Path) -> Result<(), EditError> {
-    if !from.is_dir() {
-        return Ok(());
-    }
-    create_dir(to)?;
-    for entry in std::fs::read_dir(from).map_err(IoError::system("list", from))? {
-        let path = entry.map_err(IoError::system("list", from))?.path();
-        let Some(name) = path.file_name() else { continue };
-        if path.is_dir() {
-            copy_folder(&path, &to.join(name))?;
-        } else {
-            std::fs::copy(&path, to.join(name)).map_err(IoError::system("copy", &path))?;
-        }
-    }
-    Ok(())
 }

@@ -18,6 +18,8 @@ pub(crate) const EPISODES: &str = "ntp/episodes.parquet";
 pub(crate) const CARD: &str = "README.md";
 /// Folder of the frames.
 pub(crate) const DATA: &str = "data";
+/// Folder of the videos.
+pub(crate) const VIDEOS: &str = "videos";
 /// Folder of `LeRobot`'s rows per episode.
 pub(crate) const META_EPISODES: &str = "meta/episodes";
 /// Folder of the program calls.
@@ -45,7 +47,7 @@ impl FilePlace {
 
     /// The video file of a feature.
     pub(crate) fn video(self, feature: &str) -> String {
-        format!("videos/{feature}/chunk-{:03}/file-{:03}.mp4", self.chunk, self.file)
+        format!("{VIDEOS}/{feature}/chunk-{:03}/file-{:03}.mp4", self.chunk, self.file)
     }
 
     pub(crate) fn next(self) -> Self {

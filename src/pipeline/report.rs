@@ -8,9 +8,11 @@ use crate::artifact::{FileEntry, IoError, Plan, Receipt};
 use crate::model;
 use crate::pipeline::costs::Costs;
 use crate::pipeline::runner::{Context, Options, Part, Unit};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout, tasks, train};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train};
 use crate::render::{CameraConfig, Randomization};
-use crate::report::{self, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values};
+use crate::report::{
+    self, DetectionsInput, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values,
+};
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
@@ -85,6 +87,12 @@ fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), Pipeli
         tag: tag_of(context, unit),
         path: unit.dir.path().join(rollout::TABLE),
     }));
+    for unit in &rollouts {
+        if unit.dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
+            let path = unit.dir.path().join(detections::TABLE);
+            inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
+        }
+    }
     let costs = Costs::read(context.dir)?;
     inputs.metrics.extend(trainings(context, &costs)?);
     inputs.facts.extend(facts(context)?);

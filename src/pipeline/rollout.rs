@@ -14,11 +14,13 @@ use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
+use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, detections, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
-use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy};
+use crate::rollout::{
+    self, Acted, DetectionRows, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy,
+};
 use crate::seed::Seed;
 use crate::sim::Simulation;
 use crate::task::{Split, Task, TaskSet};
@@ -26,6 +28,9 @@ use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
+/// How the paths of a shard's tables begin.
+const PART: &str = "parts/part-";
+const DETECTIONS_PART: &str = "parts/detections-";
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
@@ -138,6 +143,8 @@ struct Learned {
     variant: Variant,
     specification: SpecificationForm,
     decoder: Decoder,
+    /// Whether the decoder is the model's first.
+    is_first: bool,
     acted: Acted,
 }
 
@@ -153,7 +160,8 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
     };
     let name = model_name(spec, seed);
     let folder = context.dir.model(&name).path().to_owned();
-    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, acted }
+    let is_first = spec.decoders.first() == Some(&decoder);
+    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, is_first, acted }
 }
 
 impl Learned {
@@ -212,16 +220,26 @@ fn suite_tasks(
 /// Puts the shards' rows into one table and commits.
 fn finish(unit: &Unit, progress: &Progress) -> Result<(), PipelineError> {
     let mut rows = RolloutRows::default();
+    let mut detections: Option<DetectionRows> = None;
     for shard in 0..unit.plan.shards {
         if let Some(receipt) = unit.dir.receipt(&unit.plan, shard)? {
-            let part = receipt.files.iter().find(|file| file.path.ends_with(".parquet"));
-            if let Some(part) = part {
-                rows.append(RolloutRows::read(&unit.dir.path().join(&part.path))?);
+            for file in &receipt.files {
+                let path = unit.dir.path().join(&file.path);
+                if file.path.starts_with(PART) {
+                    rows.append(RolloutRows::read(&path)?);
+                } else if file.path.starts_with(DETECTIONS_PART) {
+                    detections.get_or_insert_default().append(DetectionRows::read(&path)?);
+                }
             }
         }
     }
     rows.write(&unit.dir.path().join(TABLE))?;
-    let manifest = unit.dir.commit(&unit.plan, &[TABLE])?;
+    let mut tables = vec![TABLE];
+    if let Some(detections) = detections {
+        detections.write(&unit.dir.path().join(detections::TABLE))?;
+        tables.push(detections::TABLE);
+    }
+    let manifest = unit.dir.commit(&unit.plan, &tables)?;
     let succeeded = manifest.episodes - manifest.failed;
     progress.finish(&format!("{succeeded} of {} succeeded", manifest.episodes));
     Ok(())
@@ -238,11 +256,19 @@ impl Suite<'_> {
         }
         context.go_on()?;
         let starts: Result<Vec<Start<'_>>, PipelineError> = range.clone().map(|episode| self.start(episode)).collect();
-        let acted = self.act(starts?)?;
-        let part = format!("parts/part-{shard:05}.parquet");
+        let starts = starts?;
+        let mut policy = self.policy(&starts)?;
         let by = self.learned.as_ref().map(|learned| learned.acted.clone()).unwrap_or_default();
+        let detections = self.detections(policy.as_ref(), &by, &starts);
+        let acted = self.act(policy.as_mut(), starts)?;
+        let part = format!("{PART}{shard:05}.parquet");
         RolloutRows::of(&spec.name, &by, &acted).write(&unit.dir.path().join(&part))?;
         let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
+        if let Some(detections) = detections {
+            let part = format!("{DETECTIONS_PART}{shard:05}.parquet");
+            detections.write(&unit.dir.path().join(&part))?;
+            files.push(FileEntry::of(unit.dir.path(), &part)?);
+        }
         files.extend(self.record(shard, &acted)?);
         unit.dir.commit_shard(&Receipt {
             plan_id: unit.plan.id(),
@@ -302,14 +328,24 @@ impl Suite<'_> {
         })
     }
 
-    fn act(&self, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
-        let mut policy: Box<dyn Policy> = match &self.learned {
+    fn policy(&self, starts: &[Start<'_>]) -> Result<Box<dyn Policy>, PipelineError> {
+        Ok(match &self.learned {
             Some(learned) => learned.policy(self.context)?,
-            None => Box::new(Oracle::for_starts(&starts)),
-        };
+            None => Box::new(Oracle::for_starts(starts)),
+        })
+    }
+
+    /// The errors of a detector, which are the same whatever decodes what is behind it.
+    fn detections(&self, policy: &dyn Policy, by: &Acted, starts: &[Start<'_>]) -> Option<DetectionRows> {
+        self.learned.as_ref().filter(|learned| learned.variant.detects() && learned.is_first)?;
+        let camera = self.context.pipeline.spec.generate.cameras.first()?;
+        detections::of_starts(policy, &self.spec.name, by, camera, starts)
+    }
+
+    fn act(&self, policy: &mut dyn Policy, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
         let factor = self.context.pipeline.spec.rollout.decisions_factor;
         let limits = Limits { decisions_factor: factor, ..Limits::default() };
-        rollout::run(policy.as_mut(), starts, limits).map_err(|source| PipelineError::Trace {
+        rollout::run(policy, starts, limits).map_err(|source| PipelineError::Trace {
             task_id: self.unit.name.clone(),
             trial: 0,
             source,

@@ -3,6 +3,7 @@
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
 use crate::report::claims::{Claim, Note, Verdict};
+use crate::report::detections::DetectionError;
 use crate::report::summary::{Aggregate, FirstError, Report};
 use crate::report::tables::{self, ModelRow};
 
@@ -33,6 +34,7 @@ pub(super) fn render(report: &Report) -> String {
         }
     };
     put(&COLUMNS, report.aggregates.iter().map(row).collect());
+    put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
     put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
     put(&MODEL_COLUMNS, tables::models(&report.models).iter().map(model).collect());
@@ -41,6 +43,39 @@ pub(super) fn render(report: &Report) -> String {
         report.notes.iter().for_each(|said| text.push_str(&note(said)));
     }
     text
+}
+
+const DETECTION_COLUMNS: [Column; 12] = [
+    ("suite", false),
+    ("model", false),
+    ("tasks", true),
+    ("seeds", true),
+    ("block in sight", false),
+    ("detections", true),
+    ("median cm", true),
+    ("mean absolute x, y, z", true),
+    ("deviation", true),
+    ("95 %, 99 %", true),
+    ("over 2 cm", true),
+    ("paper's deviation", true),
+];
+
+fn detection(error: &DetectionError) -> Vec<String> {
+    let [x, y, z] = error.mean_absolute_cm;
+    vec![
+        error.suite.clone(),
+        error.variant.clone(),
+        error.train_tasks.to_string(),
+        error.seeds.to_string(),
+        error.in_sight.words().to_owned(),
+        error.detections.to_string(),
+        format!("{:.2}", error.median_cm),
+        format!("{x:.2}, {y:.2}, {z:.2}"),
+        format!("{:.2}", error.deviation_cm),
+        format!("{:.2}, {:.2}", error.percentile_95_cm, error.percentile_99_cm),
+        format!("{:.2} %", 100.0 * error.over_2_cm),
+        format!("{:.0}", error.paper_deviation_cm),
+    ]
 }
 
 const FAILURE_COLUMNS: [Column; 7] = [

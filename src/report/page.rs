@@ -17,7 +17,7 @@ use crate::report::markdown;
 use crate::report::metrics::{self, Curve};
 use crate::report::order::{self, DECODERS};
 use crate::report::summary::{Actor, Aggregate, Fact, Report, SuiteResult};
-use crate::report::tables::{self, AdversaryRow, CostRow, HeatGrid, ModelRow, PushRow};
+use crate::report::tables::{self, AdversaryRow, CostRow, DetectionRow, HeatGrid, ModelRow, PushRow};
 
 /// Most headline figures.
 const N_TILES: usize = 4;
@@ -47,6 +47,7 @@ struct Page<'a> {
     adversary: Vec<AdversaryRow>,
     pushes: Vec<PushRow>,
     heat: Vec<HeatGrid>,
+    detections: Vec<DetectionRow>,
     models: Vec<ModelRow>,
     cost_stages: Vec<String>,
     costs: Vec<CostRow>,
@@ -171,6 +172,7 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
         adversary: tables::adversary(&report.figures),
         pushes: tables::pushes(&report.aggregates),
         heat: tables::heat(&report.grids),
+        detections: tables::detections(&report.detections),
         models: tables::models(&report.models),
         cost_stages,
         costs,

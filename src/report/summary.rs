@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::report::PaperValue;
 use crate::report::claims::{Claim, Note};
+use crate::report::detections::DetectionError;
 use crate::report::figures::{Figure, Grid};
 use crate::trace::SpecificationForm;
 
@@ -42,6 +43,8 @@ pub struct Report {
     pub divergences: Vec<Divergence>,
     /// What failed rollouts did wrong first.
     pub errors: Vec<FirstError>,
+    /// Errors of detectors in the demonstrations that models behind them were given.
+    pub detections: Vec<DetectionError>,
     /// The end of each training curve; the whole curves are in curves.csv.
     pub training: Vec<TrainingEnd>,
     /// The trained models.

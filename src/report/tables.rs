@@ -1,9 +1,10 @@
-//! The page's smaller tables: the adversary and its pushes, clean-up by bowls and forks, models, costs.
+//! The page's smaller tables: the adversary and its pushes, clean-up by bowls and forks, detectors, models, costs.
 
 use serde::Serialize;
 
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::chart::{color_of, distinct};
+use crate::report::detections::{DetectionError, InSight};
 use crate::report::figures::{Figure, Grid, Series};
 use crate::report::page::name_of;
 use crate::report::summary::{Aggregate, ModelSummary, StageCost, model_name};
@@ -126,6 +127,46 @@ fn heat_grid(grid: &Grid) -> HeatGrid {
     };
     let row = |bowls: i64| HeatRow { bowls, cells: forks.iter().map(|&forks| cell(bowls, forks)).collect() };
     HeatGrid { variant: grid.variant.clone(), rows: bowls.into_iter().map(row).collect(), forks: forks.clone() }
+}
+
+/// The errors of a detector.
+#[derive(Serialize)]
+pub(super) struct DetectionRow {
+    suite: String,
+    variant: String,
+    color: usize,
+    tasks: String,
+    seeds: u64,
+    in_sight: &'static str,
+    /// Whether it is of one part of the row above that tells of all.
+    is_part: bool,
+    detections: String,
+    median: String,
+    mean_absolute: [String; 3],
+    deviation: String,
+    percentiles: [String; 2],
+    over: String,
+}
+
+/// One row a model, suite and how much is in sight.
+pub(super) fn detections(errors: &[DetectionError]) -> Vec<DetectionRow> {
+    let cm = |value: f64| format!("{value:.2}");
+    let row = |error: &DetectionError| DetectionRow {
+        suite: error.suite.clone(),
+        variant: error.variant.clone(),
+        color: color_of(&error.variant),
+        tasks: thousands(error.train_tasks.max(0) as u64),
+        seeds: error.seeds,
+        in_sight: error.in_sight.words(),
+        is_part: error.in_sight != InSight::All,
+        detections: thousands(error.detections),
+        median: cm(error.median_cm),
+        mean_absolute: error.mean_absolute_cm.map(cm),
+        deviation: cm(error.deviation_cm),
+        percentiles: [error.percentile_95_cm, error.percentile_99_cm].map(cm),
+        over: percent(error.over_2_cm),
+    };
+    errors.iter().map(row).collect()
 }
 
 /// The models of one variant and number of tasks.

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use rand::Rng;
 
+use crate::dataset::DatasetTrials;
 use crate::model::{PictureSample, Pictures};
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
@@ -139,10 +140,9 @@ impl Shown {
         let mut by_trial: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         self.numbers.keys().for_each(|&(trial, frame)| by_trial.entry(trial).or_default().push(frame));
         for (trial, frames) in by_trial {
-            fetch(examples, gallery, trial, &frames, &mut pictures)?;
+            fetch(examples.data(), gallery, trial, &frames, &mut pictures)?;
         }
-        let rows = self.numbers.keys().flat_map(|&(trial, frame)| examples.observation_row(trial, frame)).copied();
-        Ok(Group { pictures, rows: rows.collect(), parts: Vec::new() })
+        Ok(Group { pictures, parts: Vec::new() })
     }
 
     fn number(&self, trial: usize, frame: usize) -> f32 {
@@ -161,29 +161,30 @@ impl Shown {
     }
 }
 
-/// Pictures of trials from all over the dataset.
-pub(super) fn sample(examples: &Examples<'_>, gallery: &dyn Gallery) -> Result<PictureSample, TrainError> {
-    let trials = &examples.data().trials;
-    let every = trials.len().div_ceil(SAMPLE_TRIALS).max(1);
+/// Pictures of trials from all over the dataset, and which trials these are.
+pub(super) fn sample(data: &DatasetTrials, gallery: &dyn Gallery) -> Result<(PictureSample, Vec<usize>), TrainError> {
+    let every = data.trials.len().div_ceil(SAMPLE_TRIALS).max(1);
+    let sampled: Vec<usize> = (0..data.trials.len()).step_by(every).collect();
     let (width, height) = gallery.size();
     let mut sample = PictureSample { pictures: Pictures::of_size(width, height), lengths: Vec::new() };
-    for (trial, of) in trials.iter().enumerate().step_by(every) {
-        let frames: Vec<usize> = (0..of.n_frames).collect();
-        fetch(examples, gallery, trial, &frames, &mut sample.pictures)?;
+    for &trial in &sampled {
+        let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
+        fetch(data, gallery, trial, &frames, &mut sample.pictures)?;
         sample.lengths.push(frames.len());
     }
-    Ok(sample)
+    Ok((sample, sampled))
 }
 
-fn fetch(
-    examples: &Examples<'_>,
+/// Adds pictures of a trial's frames; an error says of which trial.
+pub(super) fn fetch(
+    data: &DatasetTrials,
     gallery: &dyn Gallery,
     trial: usize,
     frames: &[usize],
     into: &mut Pictures,
 ) -> Result<(), TrainError> {
     gallery.fetch(trial, frames, into).map_err(|problem| {
-        let of = &examples.data().trials[trial];
+        let of = &data.trials[trial];
         TrainError::Trial { task: of.task_id.clone(), trial: of.trial, problem }
     })
 }

@@ -36,39 +36,46 @@ pub(super) fn each_store(
     Ok(summary)
 }
 
-/// Cameras and lanes at the left, words and numbers at the right.
+/// Cameras and lanes at the left, words and numbers at the right. Where there are no cameras, numbers lie below lanes.
 fn blueprint(playback: &Playback, n_recordings: usize) -> Result<Store, VisualizeError> {
     let mut layout = Layout::new();
     let lanes = layout.view("StateTimeline", "Running programs", "", &["/programs/**"])?;
-    let mut cameras = Vec::new();
-    for camera in &playback.cameras {
-        let origin = format!("camera/{}", camera.name);
-        cameras.push(layout.view("2D", &camera.name, &origin, &[&format!("/{origin}")])?);
-    }
-    let left = match &cameras[..] {
-        [] => lanes,
-        _ => {
-            let cameras = layout.split(ContainerKind::Grid, &cameras, &[])?;
-            layout.split(ContainerKind::Vertical, &[cameras, lanes], &[0.6, 0.4])?
+    let numbers = numbers(&mut layout, playback)?;
+    let cameras = cameras(&mut layout, playback)?;
+    let document = layout.view("TextDocument", "Episode", "episode", &["/episode"])?;
+    let log = layout.log("Calls", "calls", clock::TIMESTAMP)?;
+    let (left, right) = match (cameras, numbers) {
+        (Some(cameras), Some(numbers)) => {
+            let left = layout.split(ContainerKind::Vertical, &[cameras, lanes], &[0.6, 0.4])?;
+            (left, layout.split(ContainerKind::Vertical, &[document, log, numbers], &[0.25, 0.35, 0.4])?)
         }
+        (Some(other), None) | (None, Some(other)) => {
+            let left = layout.split(ContainerKind::Vertical, &[lanes, other], &[0.4, 0.6])?;
+            (left, layout.split(ContainerKind::Vertical, &[document, log], &[0.35, 0.65])?)
+        }
+        (None, None) => (lanes, layout.split(ContainerKind::Vertical, &[document, log], &[0.35, 0.65])?),
     };
-    let right = words_and_numbers(&mut layout, playback)?;
-    let root = layout.split(ContainerKind::Horizontal, &[left, right], &[0.6, 0.4])?;
+    let root = layout.split(ContainerKind::Horizontal, &[left, right], &[0.62, 0.38])?;
     layout.finish(root, n_recordings, clock::TIMESTAMP, None)
 }
 
-fn words_and_numbers(layout: &mut Layout, playback: &Playback) -> Result<Node, VisualizeError> {
-    let document = layout.view("TextDocument", "Episode", "episode", &["/episode"])?;
-    let log = layout.log("Calls", "calls", clock::TIMESTAMP)?;
+/// A view a camera, where there are any.
+fn cameras(layout: &mut Layout, playback: &Playback) -> Result<Option<Node>, VisualizeError> {
+    let mut views = Vec::new();
+    for camera in &playback.cameras {
+        let origin = format!("camera/{}", camera.name);
+        views.push(layout.view("2D", &camera.name, &origin, &[&format!("/{origin}")])?);
+    }
+    if views.is_empty() { Ok(None) } else { layout.split(ContainerKind::Grid, &views, &[]).map(Some) }
+}
+
+/// A plot a feature, one over the other, where there are any.
+fn numbers(layout: &mut Layout, playback: &Playback) -> Result<Option<Node>, VisualizeError> {
     let mut plots = Vec::new();
     for track in &playback.numbers {
         plots.push(layout.plot(&track.feature, &format!("numbers/{}", track.feature), None)?);
     }
-    if plots.is_empty() {
-        return layout.split(ContainerKind::Vertical, &[document, log], &[0.4, 0.6]);
-    }
-    let plots = layout.split(ContainerKind::Tabs, &plots, &[])?;
-    layout.split(ContainerKind::Vertical, &[document, log, plots], &[0.25, 0.35, 0.4])
+    if plots.is_empty() { Ok(None) } else { layout.split(ContainerKind::Tabs, &plots, &[]).map(Some) }
 }
 
 fn recording(playback: &Playback) -> Result<Store, VisualizeError> {

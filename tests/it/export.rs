@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use arrow::array::{AsArray as _, RecordBatch};
+use arrow::array::{Array as _, AsArray as _, RecordBatch};
 use arrow::datatypes::{ArrowPrimitiveType, Int64Type};
 use mcap::MessageStream;
 use ntp::artifact::read_json;
@@ -64,6 +64,55 @@ fn a_plain_dataset_has_sub_tasks_and_nothing_of_ours() {
     assert_eq!(opened.metadata.episode_count(), 6);
     assert_eq!(opened.read_episode_data(EpisodeIndex(4)).unwrap().num_rows(), 13);
     assert_eq!(opened.subtask_by_index(SubtaskIndex(0)).unwrap().subtask, "block_stacking");
+}
+
+/// What each style says at a time, as LeRobot looks it up: the last row that is not later.
+fn active_at<'r>(rows: &'r [(f32, String, String)], style: &str, time: f32) -> Option<&'r str> {
+    rows.iter().rfind(|(begin, of, _)| of == style && *begin <= time).map(|(.., content)| content.as_str())
+}
+
+/// The rows of language of a frame: time, style, content.
+fn language(rows: &RecordBatch, frame: usize) -> Vec<(f32, String, String)> {
+    let list = rows.column_by_name("language_persistent").unwrap().as_list::<i32>().value(frame);
+    let entries = list.as_struct();
+    let text = |name: &str| entries.column_by_name(name).unwrap().as_string::<i32>().clone();
+    let times = entries.column_by_name("timestamp").unwrap().as_primitive::<arrow::datatypes::Float32Type>().clone();
+    let (styles, contents) = (text("style"), text("content"));
+    assert!(text("role").iter().all(|role| role == Some("assistant")));
+    (0..entries.len()).map(|at| (times.value(at), styles.value(at).to_owned(), contents.value(at).to_owned())).collect()
+}
+
+#[test]
+fn language_columns_say_what_goes_on_at_each_moment() {
+    let folder = exported(LabelForm::Language);
+    let labels = folder.path().join("labels");
+    let rows = rows(&labels.join(DATA));
+    let episodes = rows.column_by_name("episode_index").unwrap().as_primitive::<Int64Type>().values().to_vec();
+    let third: Vec<usize> = (0..episodes.len()).filter(|&row| episodes[row] == 2).collect();
+    let said = language(&rows, third[0]);
+    // Every frame of an episode has the same rows; there are no events.
+    assert!(third.iter().all(|&row| language(&rows, row) == said));
+    assert_eq!(rows.column_by_name("language_events").unwrap().as_list::<i32>().values().len(), 0);
+    let expected = [
+        (0.0, "1. pick_and_place block_D block_B", "pick block_D", "move to block_D"),
+        (0.1, "1. pick_and_place block_D block_B", "pick block_D", "grip"),
+        (0.2, "1. pick_and_place block_D block_B", "place on block_B", "move to block_B"),
+        (0.3, "1. pick_and_place block_D block_B", "place on block_B", "release"),
+    ];
+    for (time, plan, subtask, motion) in expected {
+        let found = ["plan", "subtask", "motion"].map(|style| active_at(&said, style, time));
+        assert_eq!(found, [Some(plan), Some(subtask), Some(motion)], "{time}");
+    }
+    let info: Value = read_json(&labels.join("meta/info.json")).unwrap();
+    assert_eq!(info["features"]["language_events"], json!({ "dtype": "language", "shape": [1], "names": null }));
+    let opened = LeRobotDatasetV3::load_from_directory(&labels).unwrap();
+    let read = opened.read_episode_data(EpisodeIndex(2)).unwrap();
+    assert!(read.column_by_name("language_persistent").is_some());
+    // A plan counts what is left: the last tower has more than one sub-task.
+    let last = language(&rows, rows.num_rows() - 1);
+    let plans: Vec<usize> =
+        last.iter().filter(|(_, style, _)| style == "plan").map(|(.., plan)| plan.lines().count()).collect();
+    assert_eq!(plans, [3, 2, 1]);
 }
 
 #[test]

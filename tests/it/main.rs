@@ -17,6 +17,8 @@ mod dataset_loading;
 #[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
+mod detecting;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;

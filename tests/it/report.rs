@@ -4,7 +4,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use ntp::report::{
-    Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, Verdict, json_schema, make, paper_values,
+    DetectionsInput, Fact, InSight, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, Verdict,
+    json_schema, make, paper_values,
 };
 use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
 use serde_json::{Value, json};
@@ -161,6 +162,7 @@ impl Run {
             }],
             commits: vec!["0123456789".to_owned()],
             paper: paper_values(),
+            ..ReportInputs::default()
         };
         Self { folder, inputs }
     }
@@ -192,6 +194,45 @@ fn ten_rollouts_become_a_results_table() {
     ten,ntp,,100,trajectories,mss,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000,3,6
     ten,flat,,100,trajectories,mss,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000,,
     "#);
+}
+
+/// A detector's errors along x, in two frames of two blocks each, one of which is half hidden.
+fn detections_table() -> DataFrame {
+    df!(
+        "variant" => vec!["ntp_vid_detector"; 4],
+        "suite" => vec!["stacking_unseen"; 4],
+        "training_seed" => vec![0_i64; 4],
+        "train_tasks" => vec![100_i64; 4],
+        "error_x_m" => vec![0.001_f64, -0.003, 0.001, -0.03],
+        "error_y_m" => vec![0.0_f64; 4],
+        "error_z_m" => vec![0.0_f64, 0.004, 0.0, 0.04],
+        "visible_share" => vec![1.0_f64, 0.8, 0.9, 0.5],
+    )
+    .unwrap()
+}
+
+#[test]
+fn detections_become_errors_in_centimetres_by_what_is_in_sight() {
+    let mut run = Run::new(&ten_rollouts());
+    let path = run.folder.path().join("rollouts/all/detections.parquet");
+    write_parquet(&path, detections_table());
+    run.inputs.detections = vec![DetectionsInput { experiment: "ten".to_owned(), path }];
+    let report = run.make();
+    let parts: Vec<InSight> = report.detections.iter().map(|error| error.in_sight).collect();
+    assert_eq!(parts, [InSight::All, InSight::Full, InSight::Part]);
+    let all = &report.detections[0];
+    assert_eq!((all.detections, all.seeds), (4, 1));
+    // Distances are 0.1, 0.1, 0.5 and 5 cm.
+    assert_eq!([all.median_cm, all.percentile_95_cm, all.over_2_cm], [0.1, 5.0, 0.25]);
+    assert_eq!(all.mean_absolute_cm, [0.875, 0.0, 1.1]);
+    // Squares along x sum up to 9.11 cm², with a mean error of -0.775 cm; along z to 16.16 cm², with one of 1.1 cm.
+    let variance = (9.11 / 4.0 - 0.775_f64.powi(2) + 16.16 / 4.0 - 1.1_f64.powi(2)) / 3.0;
+    assert!((all.deviation_cm - variance.sqrt()).abs() < 1e-9, "{}", all.deviation_cm);
+    assert_eq!((report.detections[1].detections, report.detections[2].median_cm), (3, 5.0));
+    for (file, told) in [("report.md", "| 1/4 to 3/4"), ("index.html", "Detectors"), ("report.json", "\"in_sight\"")] {
+        assert!(run.text(file).contains(told), "{file}");
+    }
+    assert!(report.inputs.iter().any(|input| input.path.ends_with("detections.parquet")));
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::frames::FrameRows;
-use crate::dataset::info::{Info, NtpInfo};
+use crate::dataset::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
@@ -25,17 +25,24 @@ const BATCH_ROWS: usize = 8192;
 
 /// Writes the dataset.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
-    let (info, labels) = write_frames(root, to)?;
+    let (info, labels) = write_frames(root, to, Vec::new(), Ok)?;
     copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &MetaRows::options(), Ok)?;
     Ok(ExportSummary { episodes: info.total_episodes, labels })
 }
 
-/// Writes all but the rows of episodes. Each frame has a label.
-pub(super) fn write_frames(root: &Path, to: &Path) -> Result<(Info, u64), EditError> {
+/// Writes all but the rows of episodes: frames as `change` gives them, with further features. Each frame has a label.
+pub(super) fn write_frames(
+    root: &Path,
+    to: &Path,
+    further: Vec<(String, FeatureInfo)>,
+    change: impl FnMut(RecordBatch) -> Result<RecordBatch, EditError>,
+) -> Result<(Info, u64), EditError> {
     let mut info: Info = read_json(&root.join(layout::INFO))?;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
-    copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots), Ok)?;
+    copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots), change)?;
+    copy_folder(&root.join(layout::VIDEOS), &to.join(layout::VIDEOS))?;
     info.features.0.retain(|(name, _)| !is_ours(name));
+    info.features.0.extend(further);
     write_json(&to.join(layout::INFO), &info)?;
     let mut stats: BTreeMap<String, Value> = read_json(&root.join(layout::STATS))?;
     stats.retain(|name, _| !is_ours(name));
@@ -45,6 +52,24 @@ pub(super) fn write_frames(root: &Path, to: &Path) -> Result<(Info, u64), EditEr
     }
     let labels = info.total_frames;
     Ok((info, labels))
+}
+
+/// Copies a folder with all that is in it, where it is there.
+pub(in crate::dataset) fn copy_folder(from: &Path, to: &Path) -> Result<(), EditError> {
+    if !from.is_dir() {
+        return Ok(());
+    }
+    create_dir(to)?;
+    for entry in std::fs::read_dir(from).map_err(IoError::system("list", from))? {
+        let path = entry.map_err(IoError::system("list", from))?.path();
+        let Some(name) = path.file_name() else { continue };
+        if path.is_dir() {
+            copy_folder(&path, &to.join(name))?;
+        } else {
+            std::fs::copy(&path, to.join(name)).map_err(IoError::system("copy", &path))?;
+        }
+    }
+    Ok(())
 }
 
 /// Columns that only this project knows.

@@ -30,7 +30,7 @@ const LEVELS: [(&str, LabelsOf); 2] = [("sparse", LabelledEpisode::subtasks), ("
 
 /// Writes the dataset with SARM's columns.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
-    write_frames(root, to)?;
+    write_frames(root, to, Vec::new(), Ok)?;
     let (info, mut reader) = LabelReader::open(root)?;
     let mut proportions = [Proportions::default(), Proportions::default()];
     let mut summary = ExportSummary::default();

@@ -26,7 +26,7 @@ pub(super) fn key_of(dtype: Dtype, value: f64) -> u64 {
         Dtype::Float32 => u64::from(key_of_f32(value as f32)),
         Dtype::Float64 => key_of_f64(value),
         Dtype::Int64 => key_of_i64(value as i64),
-        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other => value as u64,
+        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other => value as u64,
     }
 }
 
@@ -39,7 +39,7 @@ pub(super) fn value_of(dtype: Dtype, key: u64) -> f64 {
         }
         Dtype::Float64 => f64::from_bits(if key >> 63 == 1 { key & !(1 << 63) } else { !key }),
         Dtype::Int64 => (key ^ 1 << 63) as i64 as f64,
-        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other => key as f64,
+        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other => key as f64,
     }
 }
 
@@ -47,7 +47,7 @@ pub(super) fn value_of(dtype: Dtype, key: u64) -> f64 {
 pub(super) fn n_bytes(dtype: Dtype) -> usize {
     match dtype {
         Dtype::Float32 => 4,
-        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other => 1,
+        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other => 1,
         Dtype::Float64 | Dtype::Int64 => 8,
     }
 }
@@ -103,7 +103,7 @@ pub(super) fn read_keys(dtype: Dtype, bytes: &[u8], (dimension, width): (usize, 
             let rows = bytes.as_chunks::<8>().0.chunks_exact(width);
             keys.extend(rows.map(|row| u64::from_le_bytes(row[dimension])));
         }
-        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Other => {
+        Dtype::Bool | Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other => {
             keys.extend(bytes.chunks_exact(width).map(|row| u64::from(row[dimension])));
         }
     }
