@@ -108,7 +108,7 @@ pub enum PipelineError {
         /// The camera's name.
         camera: String,
         /// Why not.
-        source: VideoError,
+        source: Box<VideoError>,
     },
     /// The expert could not demonstrate a task for a suite.
     #[error("suite {suite}: the expert failed all {attempts} attempts to demonstrate {task_id}")]

@@ -312,7 +312,7 @@ impl Suite<'_> {
                 episode: demonstration.provenance.index,
                 task_id: demonstration.provenance.task_id.clone(),
                 camera: camera.name.clone(),
-                source,
+                source: Box::new(source),
             })
         };
         camera.map(look).transpose()

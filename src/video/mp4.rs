@@ -79,7 +79,8 @@ pub struct Mp4Sample {
     pub seconds: f64,
     /// Whether it can be shown without those before.
     pub is_key: bool,
-    offset: u64,
+    /// Where in the file its bytes begin.
+    pub offset: u64,
     len: u64,
 }
 
@@ -171,7 +172,9 @@ impl Mp4Reader {
         self.file.seek(SeekFrom::Start(sample.offset)).map_err(io("read"))?;
         self.file.read_exact(&mut bytes).map_err(io("read"))?;
         packet.clear();
-        if sample.is_key {
+        // Some writers keep them in the pictures too.
+        let has_sets = bytes.get(4).is_some_and(|header| header & 0x1f == PARAMETER_SET);
+        if sample.is_key && !has_sets {
             packet.extend_from_slice(&self.parameter_sets);
         }
         let mut rest = bytes.as_slice();
@@ -186,5 +189,7 @@ impl Mp4Reader {
     }
 }
 
+/// The kind of unit that is a sequence's parameter set.
+const PARAMETER_SET: u8 = 7;
 /// Before each unit of Annex B.
 const START_CODE: [u8; 4] = [0, 0, 0, 1];

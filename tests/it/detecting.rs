@@ -16,8 +16,8 @@ use ntp::table::{TableSchema, read};
 use ntp::task::{Family, Split, initial_state, scene};
 use ntp::trace::{Episode, SpecificationForm};
 use ntp::training::{
-    DETECTOR_METRICS_FILE, DetectorTraining, Gallery, Hooks, Progress, TrainConfig, TrainError, TrainSummary, Training,
-    train_seeing,
+    DETECTOR_METRICS_FILE, DetectorTraining, Gallery as _, Hooks, Progress, TrainConfig, TrainError, TrainSummary,
+    Training, train_seeing,
 };
 
 use crate::kinematic::{demonstration, tower, trial};

@@ -6,6 +6,8 @@ use crate::render::mesh::{Mesh, Paint, Print, Surface};
 use crate::render::texture::{self, Texture};
 use crate::scene::{Body, Bowl, Shape};
 
+/// Walls of bowls are thinner than the texels of a small picture's shadow map.
+const BOWL_SLACK: f32 = 0.75;
 /// Sides of round bodies.
 const N_SIDES: usize = 24;
 
@@ -109,6 +111,7 @@ fn open_box(mesh: &mut Mesh, [half_x, half_y, height]: [f32; 3], wall: f32, colo
 /// The bowl's prisms; walls and foot are shaded as if they were round.
 fn bowl(mesh: &mut Mesh, form: &Bowl, color: [f32; 3]) {
     let paint = Paint { color, gloss: 0.45 };
+    mesh.shadow_slack = BOWL_SLACK;
     let flare = (form.rim_radius_m - form.floor_radius_m) / form.height_m;
     let length = (1.0 + flare * flare).sqrt();
     let outside = Surface::Cone { radial: 1.0 / length, axial: -flare / length };

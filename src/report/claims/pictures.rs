@@ -68,8 +68,8 @@ const NOTES: [(&str, &str); 5] = [
     ),
     (
         "ntp_vid_detector",
-        "A detector on colour slots that learns from true positions, with all that colour slots need; NTP behind it \
-         learns on what it finds.",
+        "A detector that finds things by their colour and learns from true positions, with all that colour slots need; \
+         NTP behind it learns on what it finds.",
     ),
     ("ntp_vid_detector_paper", "A detector of VGG16's shape that learns from true positions, before `ntp_paper`."),
 ];
@@ -78,9 +78,9 @@ const NOTES: [(&str, &str); 5] = [
 const COMMON: [&str; 2] = [
     "The model names the object; where that is, `move_to` is told by the simulator, as in the paper end to end. The \
      paper's detector also says where; ours is asked for what programs decide on alone.",
-    "The paper has full state above end to end above the detector. Ours differs where one way of seeing serves both: \
-     colour slots, unlike the paper's two networks, are the same end to end and in the detector, so that what one of \
-     them cannot see the other cannot either, and the difference between them is small.",
+    "The paper has full state above end to end above the detector. Where ours differs, colour is why: unlike the \
+     paper's two networks, `ntp_vid_e2e` and `ntp_vid_detector` both find things by their colour, so that what one of \
+     them cannot see the other cannot either, and little is left to tell them apart.",
 ];
 
 /// Every claim that our rollouts can say something about, for each way of seeing.
