@@ -1,7 +1,7 @@
 //! Keypoints: what learned convolutions find in a picture, wherever it is.
 //!
 //! ```text
-//! picture ─► convolutions ─► features of each cell ─► for each keypoint a score of each cell
+//! picture, contrasts ─► convolutions ─► features of each cell ─► for each keypoint a score of each cell
 //! softmax over cells ─► x, y, presence, spread
 //! ```
 //!
@@ -110,7 +110,7 @@ impl Keypoints {
         let seen = self
             .shrinking
             .iter()
-            .fold(pictures.to_tensor(&self.scores.weight.device()), |seen, layer| relu(layer.forward(seen)));
+            .fold(pictures.to_contrast_tensor(&self.scores.weight.device()), |seen, layer| relu(layer.forward(seen)));
         self.widening.iter().fold(seen, |seen, layer| relu(seen.clone() + layer.forward(seen)))
     }
 }
@@ -125,7 +125,7 @@ impl Perception for Keypoints {
         let around = |reach| PaddingConfig2d::Explicit(reach, reach, reach, reach);
         let half = features / 2;
         Self {
-            shrinking: vec![init.conv([3, half], 5, 2, around(2)), init.conv([half, features], 3, 2, around(1))],
+            shrinking: vec![init.conv([4, half], 5, 2, around(2)), init.conv([half, features], 3, 2, around(1))],
             widening: vec![init.conv([features, features], 3, 1, around(1))],
             scores: init.linear(features, 1 + slots),
         }

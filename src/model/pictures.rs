@@ -53,8 +53,78 @@ impl Pictures {
         Tensor::<4>::from_data(TensorData::new(values, shape), device).permute([0, 3, 1, 2])
     }
 
+    /// The same with a fourth channel: brightness against its surroundings, in their deviations. What is written on a
+    /// thing looks alike there in any colour and light. `[n, 4, height, width]`
+    pub(crate) fn to_contrast_tensor(&self, device: &Device) -> Tensor<4> {
+        let contrasts: Vec<f32> =
+            self.iter().flat_map(|picture| contrasts(&brightness(picture), self.width, self.height)).collect();
+        let shape = [self.n, 1, self.height, self.width];
+        let contrasts = Tensor::<4>::from_data(TensorData::new(contrasts, shape), device);
+        Tensor::cat(vec![self.to_tensor(device), contrasts], 1)
+    }
+
     /// Bytes of one.
     pub fn n_bytes(&self) -> usize {
         self.width * self.height * 3
+    }
+}
+
+/// Mean of the channels, 0 to 1.
+fn brightness(rgb: &[u8]) -> Vec<f32> {
+    rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.iter().map(|&value| f32::from(value)).sum::<f32>() / 765.0).collect()
+}
+
+/// Pixels to each side that are the surroundings of one.
+const REACH: usize = 4;
+/// Deviation, of 0 to 1, below which surroundings count as even.
+const EVEN: f32 = 0.02;
+
+/// How far each value is above the mean of its surroundings, in their deviations.
+fn contrasts(values: &[f32], width: usize, height: usize) -> Vec<f32> {
+    let squares: Vec<f32> = values.iter().map(|value| value * value).collect();
+    let (means, squares) = (box_means(values, width, height), box_means(&squares, width, height));
+    let contrast =
+        |((value, mean), square): ((&f32, f32), f32)| (value - mean) / ((square - mean * mean).max(0.0).sqrt() + EVEN);
+    values.iter().zip(means).zip(squares).map(contrast).collect()
+}
+
+/// Means over the square about each value, as far as it lies in the picture: rows first, then columns.
+fn box_means(values: &[f32], width: usize, height: usize) -> Vec<f32> {
+    let around = |at: usize, size: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(size);
+    let mean = |values: &mut dyn Iterator<Item = f32>, n: usize| values.sum::<f32>() / n as f32;
+    let rows: Vec<f32> = (0..width * height)
+        .map(|at| {
+            let (columns, row) = (around(at % width, width), at / width * width);
+            mean(&mut values[row + columns.start..row + columns.end].iter().copied(), columns.len())
+        })
+        .collect();
+    let column = |at: usize| {
+        let lines = around(at / width, height);
+        let n_lines = lines.len();
+        mean(&mut lines.map(|line| rows[line * width + at % width]), n_lines)
+    };
+    (0..width * height).map(column).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{box_means, contrasts};
+
+    #[test]
+    fn a_mean_is_over_what_lies_in_the_picture() {
+        let values: Vec<f32> = (0..12).map(|value| value as f32).collect();
+        // Six columns, two rows: the first value's surroundings are five columns of both rows.
+        assert_eq!(box_means(&values, 6, 2)[0], (2.0 + 8.0) / 2.0);
+        assert_eq!(box_means(&values, 6, 2)[5], (3.0 + 9.0) / 2.0);
+    }
+
+    #[test]
+    fn contrast_is_the_same_in_any_light_and_nothing_on_even_ground() {
+        let written: Vec<f32> = (0..400).map(|at| if at % 20 == 10 { 0.2 } else { 0.6 }).collect();
+        let darker: Vec<f32> = written.iter().map(|value| value * 0.7).collect();
+        let pairs = contrasts(&written, 20, 20).into_iter().zip(contrasts(&darker, 20, 20));
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.25 && a.signum() == b.signum()));
+        assert!(contrasts(&written, 20, 20)[10] < -1.5);
+        assert!(contrasts(&[0.4; 100], 10, 10).into_iter().all(|contrast| contrast.abs() < 1e-3));
     }
 }

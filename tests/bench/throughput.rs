@@ -8,10 +8,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use burn::tensor::Device;
 use cpu_time::ProcessTime;
 use ntp::dataset::{ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, convert, read_trials};
 use ntp::expert::demonstrate;
-use ntp::model::{Decoder, Variant};
+use ntp::model::{Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
 use ntp::rollout::{Limits, Start, load_policy, run};
@@ -50,6 +51,9 @@ fn main() {
     if ["generate_stacking_video_64", "convert_images_64", "load_images_64", "load_video_64"].into_iter().any(wanted) {
         bench.videos();
     }
+    if wanted("train_convolutions_64") {
+        train_convolutions();
+    }
     if wanted("generate_sorting_40") {
         bench.generate_sorting_40();
     }
@@ -75,6 +79,22 @@ fn cpu_secs<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = ProcessTime::now();
     let value = work();
     (value, start.elapsed().as_secs_f64())
+}
+
+/// The paper's seven convolutions there and back over 32 pictures of 64 pixels, as `tests/bench/convolutions.py` does in
+/// `PyTorch`.
+fn train_convolutions() {
+    const STEPS: usize = 30;
+    const BATCH: usize = 32;
+    let config = ConvolvedConfig::of_pixels(64);
+    let network = Ntp::<FlatEncoder<Convolved>>::new(&config, 8, Seed(1), &Device::flex().autodiff());
+    let mut pictures = Pictures::of_size(64, 64);
+    let value = |picture: usize, at: usize| ((picture * 7919 + at * 104_729) % 251) as u8;
+    (0..BATCH).for_each(|n| pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>()));
+    let step = || drop(network.perceive(&pictures).powf_scalar(2.0).sum().backward());
+    step();
+    let ((), secs) = cpu_secs(|| (0..STEPS).for_each(|_| step()));
+    report("train_convolutions_64", (STEPS * BATCH) as f64 / secs, "pictures per CPU-second");
 }
 
 /// Pictures of a demonstration from the front: colours, depths and segments of the table, 8 blocks and the gripper.

@@ -100,7 +100,7 @@ fn noise(shift: usize) -> Pictures {
 fn keypoints_have_a_score_for_each_slot_in_each_cell_and_the_robot_first() {
     let config = KeypointsConfig::of(64, 4);
     let keypoints = Keypoints::fresh(&config, Seed(1), &Device::flex());
-    let layers = [25 * 3 * 16 + 16, 9 * 16 * 32 + 32, 9 * 32 * 32 + 32, 32 * 5 + 5];
+    let layers = [25 * 4 * 16 + 16, 9 * 16 * 32 + 32, 9 * 32 * 32 + 32, 32 * 5 + 5];
     assert_eq!(keypoints.num_params(), layers.iter().sum::<usize>());
     let (percepts, looks) = keypoints.look(&noise(0));
     assert_eq!((percepts.dims(), looks.scores().dims()), ([1, 5, 4], [1, 256, 4]));
