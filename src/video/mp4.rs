@@ -89,7 +89,7 @@ pub struct Mp4Reader {
     file: File,
     samples: Vec<Mp4Sample>,
     size_px: [u32; 2],
-    /// In Annex B, before each key frame.
+    /// In Annex B, before each key frame that does not bring them.
     parameter_sets: Vec<u8>,
 }
 
@@ -162,16 +162,19 @@ impl Mp4Reader {
         self.file.seek(SeekFrom::Start(sample.offset)).map_err(io("read"))?;
         self.file.read_exact(&mut bytes).map_err(io("read"))?;
         packet.clear();
-        if sample.is_key {
-            packet.extend_from_slice(&self.parameter_sets);
-        }
+        let mut has_sets = false;
         let mut rest = bytes.as_slice();
         while let Some((length, behind)) = rest.split_first_chunk::<4>() {
             let unit = behind.get(..u32::from_be_bytes(*length) as usize);
             let unit = unit.ok_or_else(|| container(&self.path, &format!("picture {position} is cut off")))?;
+            has_sets |= unit.first().is_some_and(|head| head & UNIT_KIND == PARAMETER_SET);
             packet.extend_from_slice(&START_CODE);
             packet.extend_from_slice(unit);
             rest = &behind[unit.len()..];
+        }
+        // Muxers keep them in the samples or take them out: a packet has them once, so that copies stay the same.
+        if sample.is_key && !has_sets {
+            packet.splice(0..0, self.parameter_sets.iter().copied());
         }
         Ok(())
     }
@@ -179,3 +182,7 @@ impl Mp4Reader {
 
 /// Before each unit of Annex B.
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
+/// The bits of a unit's first byte that say what it is.
+const UNIT_KIND: u8 = 0x1f;
+/// A sequence parameter set.
+const PARAMETER_SET: u8 = 7;

@@ -278,10 +278,9 @@ fn sample_offset(path: &Path, sample: usize) -> usize {
     let begin = bytes.windows(4).position(|name| name == b"mdat").unwrap() + 4;
     let mut reader = Mp4Reader::open(path).unwrap();
     let mut packet = Vec::new();
-    let sets = reader.parameter_sets().len();
     (0..sample).fold(begin, |offset, sample| {
         reader.read(sample, &mut packet).unwrap();
-        offset + packet.len() - if reader.samples()[sample].is_key { sets } else { 0 }
+        offset + packet.len()
     })
 }
 
