@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const ROOT: &str = "schemas/mcap";
 
 /// Message types that a channel of a recording may carry, and the files that declare them.
-const MESSAGES: [(&str, &str); 13] = [
+const MESSAGES: [(&str, &str); 14] = [
     ("foxglove.CameraCalibration", "foxglove/CameraCalibration.proto"),
     ("foxglove.CompressedImage", "foxglove/CompressedImage.proto"),
     ("foxglove.CompressedVideo", "foxglove/CompressedVideo.proto"),
@@ -23,6 +23,7 @@ const MESSAGES: [(&str, &str); 13] = [
     ("ntp.v1.ProgramCall", "ntp/v1/program_call.proto"),
     ("ntp.v1.ProgramReturn", "ntp/v1/program_return.proto"),
     ("ntp.v1.ProgramStack", "ntp/v1/program_stack.proto"),
+    ("ntp.v1.Push", "ntp/v1/push.proto"),
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -227,6 +227,7 @@ pub struct QueryArgs {
 pub struct PublishArgs {
     /// The dataset.
     pub dataset: PathBuf,
+    #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The folder to publish it into, or s3://BUCKET[/PREFIX]; the same command carries on what was interrupted.
     #[arg(long, value_name = "DIR|URL")]
     pub to: Place,
@@ -256,6 +257,7 @@ pub struct PublishArgs {
 /// `ntp verify`.
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
+    #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The published folder, or s3://BUCKET[/PREFIX].
     #[arg(value_name = "DIR|URL")]
     pub copy: Place,

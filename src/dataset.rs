@@ -63,7 +63,7 @@ pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use lookup::{CallFacts, EpisodeFacts, FrameFacts, look_up};
-pub use pictures::EpisodePictures;
+pub use pictures::{Decoded, EpisodePictures, EpisodeRows, PictureLoader};
 pub use playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
 pub use read::read_trials;
 pub use summary::{DatasetSummary, summarize};

@@ -45,6 +45,7 @@ pub fn demonstrate(task: &Task, world: &mut dyn RobotApi, provenance: Provenance
         frames,
         specification_frames: n_frames,
         calls: calls.finish_demonstration(n_frames.saturating_sub(1)),
+        pushes: world.pushes().unwrap_or_default().to_vec(),
         outcome,
     })
 }

@@ -28,6 +28,7 @@ mod encoder;
 mod features;
 mod flattened;
 mod instructed;
+mod keypoints;
 mod layers;
 mod memory;
 mod network;
@@ -50,20 +51,24 @@ pub use config::{ModelConfig, NetworkConfig};
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
 pub use decisions::{Decisions, MAX_ARGUMENTS};
 pub use decoder::{Decoder, LabelScores, span_score};
-pub use detecting::{Detecting, Detections};
-pub use detector::{Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig};
+pub use detecting::{Detecting, Detections, detected_rows};
+pub(crate) use detector::loss as detection_loss;
+pub use detector::{
+    DetectionLoss, Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig, detector_of,
+};
 pub use encoder::{ArgumentDecoder, Encoder, Widths};
 pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened, FlattenedConfig};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};
+pub use keypoints::{CellLooks, GlimpseNaming, Keypoints, KeypointsConfig};
 pub use memory::ProgramMemory;
 pub use network::{CoreOutput, Given, Network};
 pub use npi::{BySlot, ByVector, CallEncoder, Npi, NpiReading, SlotReading};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
-pub use perception::Perception;
+pub use perception::{Looks, Perception};
 pub use pictures::{PictureSample, Pictures};
 pub use programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope, Programmer};
 pub use scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
-pub use sighted::{Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
+pub use sighted::{PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,

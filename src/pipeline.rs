@@ -15,6 +15,7 @@
 mod convert;
 mod costs;
 mod demonstration;
+mod detections;
 mod error;
 mod eye;
 mod gallery;
@@ -34,6 +35,7 @@ mod verify;
 
 pub use demonstration::demonstration_of;
 pub use error::PipelineError;
+pub use eye::cameras_of;
 pub use layout::RunDir;
 pub use resolve::Pipeline;
 pub use runner::{Options, StageReport, Status, run, run_study};

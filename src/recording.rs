@@ -13,6 +13,7 @@
 //! | `/ntp/observation` | `ntp.v1.Observation` | each frame: what is not a pose |
 //! | `/ntp/call`, `/ntp/return` | `ntp.v1.ProgramCall`, `ProgramReturn` | each program call and its return |
 //! | `/camera/NAME/image` or `/video`, `/calibration`, `/tf` | `foxglove.*` | what cameras saw, if there are any |
+//! | `/ntp/push` | `ntp.v1.Push` | each push of an adversary |
 //! | `/ntp/stack`, `/ntp/event`, `/scene`, `/log` | `ntp.v1.ProgramStack`, `foxglove.*` | for viewers alone |
 //!
 //! # Units and frames
@@ -38,6 +39,7 @@ mod events;
 mod index;
 mod inspect;
 mod observation;
+mod pushes;
 mod reader;
 mod repair;
 mod schema;

@@ -27,10 +27,12 @@ mod shade;
 mod shadow;
 mod texture;
 mod view;
+mod visibility;
 
 pub use camera::{Camera, Mount, looking_at};
 pub use config::{CameraConfig, CameraError, PictureFormat, PictureQuality, Viewpoint};
-pub use look::{Light, Look, Shadows};
+pub use look::{Letters, Light, Look, Shadows};
 pub use picture::{Picture, Segment};
 pub use randomize::Randomization;
 pub use renderer::Renderer;
+pub use visibility::Visibility;

@@ -2,7 +2,7 @@
 //!
 //! # Input and output
 //!
-//! Reads rollouts.parquet and metrics.parquet files (schemas/parquet/); writes `report.json`
+//! Reads rollouts.parquet, metrics.parquet and detections.parquet files (schemas/parquet/); writes `report.json`
 //! (schemas/report.schema.json), `report.md`, `results.csv`, `curves.csv` and `index.html`, which needs no other file.
 //!
 //! # Invariants
@@ -14,6 +14,7 @@ mod aggregate;
 mod chart;
 mod claims;
 mod csv;
+mod detections;
 mod figures;
 mod frames;
 mod interval;
@@ -26,9 +27,10 @@ mod rollouts;
 mod summary;
 mod tables;
 
-pub use claims::{Claim, Verdict};
+pub use claims::{Claim, Note, Verdict};
+pub use detections::{DetectionError, DetectionsInput, InSight};
 pub use figures::{Figure, Grid, GridCell, PaperPoint, Point, Series};
-pub use interval::wilson;
+pub use interval::{student, wilson};
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
 pub use rollouts::RolloutsInput;
@@ -52,6 +54,8 @@ pub struct ReportInputs {
     pub rollouts: Vec<RolloutsInput>,
     /// metrics.parquet files, in any order.
     pub metrics: Vec<MetricsInput>,
+    /// detections.parquet files, in any order.
+    pub detections: Vec<DetectionsInput>,
     /// What else there is to say of the run, in the order it is to be told.
     pub facts: Vec<Fact>,
     /// What each stage took, as far as it was measured.
@@ -118,8 +122,11 @@ pub enum ReportError {
 
 /// An actor for an error.
 fn told(actor: &Actor) -> String {
-    let Actor { experiment, variant, train_tasks, specification: _, decoder } = actor;
+    let Actor { experiment, variant, tag, train_tasks, specification: _, decoder } = actor;
     let mut told = format!("experiment {experiment}, variant {variant}");
+    if let Some(tag) = tag {
+        told.push_str(&format!(" ({tag})"));
+    }
     if let Some(tasks) = train_tasks {
         told.push_str(&format!(" trained on {tasks} tasks"));
     }
@@ -144,12 +151,14 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
         title: inputs.title.clone(),
         claims: claims::claims(&aggregates),
+        notes: claims::notes(&aggregates),
         figures: figures::figures(&aggregates),
         grids: figures::grids(&aggregates),
         aggregates,
         results: rollouts.results,
         divergences: rollouts.divergences,
         errors: rollouts.errors,
+        detections: detections::read(&inputs.detections)?,
         training: metrics::ends(&curves),
         models: inputs.metrics.iter().map(|metrics| metrics.model.clone()).collect(),
         costs: inputs.costs.clone(),
@@ -176,8 +185,9 @@ pub fn json_schema() -> serde_json::Value {
 /// so that a run can be moved without a change of bytes.
 fn input_files(inputs: &ReportInputs, out: &Path) -> Result<Vec<InputFile>, IoError> {
     let run_dir = out.parent().unwrap_or(out);
-    let paths =
-        inputs.rollouts.iter().map(|rollouts| &rollouts.path).chain(inputs.metrics.iter().map(|metrics| &metrics.path));
+    let paths = (inputs.rollouts.iter().map(|rollouts| &rollouts.path))
+        .chain(inputs.metrics.iter().map(|metrics| &metrics.path))
+        .chain(inputs.detections.iter().map(|detections| &detections.path));
     let file = |path: &PathBuf| {
         let shown = path.strip_prefix(run_dir).unwrap_or(path);
         Ok(InputFile { path: shown.display().to_string(), sha256: artifact::sha256_file(path)? })

@@ -7,6 +7,7 @@
 //!
 //! [`Episode`]: crate::trace::Episode
 
+mod detections;
 mod divergence;
 mod expectation;
 mod interpreter;
@@ -15,6 +16,7 @@ mod oracle;
 mod policy;
 mod rows;
 
+pub use detections::{Detected, DetectionRows};
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use expectation::Expectation;
 pub use interpreter::{Eye, Limits, RolloutEpisode, Sight, Start, run};

@@ -18,7 +18,7 @@ pub use file::TaskFileError;
 pub use goal::{Condition, Goal, condition_holds, goal_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
 pub use layout::{CONTAINER_HALF_M, Trial, initial_state, scene};
-pub use sampler::{SampleError, sample, split_limits};
+pub use sampler::{SampleError, TaskPool, sample};
 pub use set::{TaskSet, TaskSetError};
 
 use std::fmt;
@@ -87,6 +87,11 @@ impl Family {
             Self::ObjectSorting => Some(layout::MAX_INSTANCES),
             Self::TableCleanup => Some(layout::cleanup::MAX_FORKS),
         }
+    }
+
+    /// The most blocks that a task can have within reach; nothing for a family without blocks.
+    pub fn max_blocks(self) -> Option<u16> {
+        (self == Self::BlockStacking).then_some(layout::stacking::N_BLOCKS)
     }
 
     /// The most bowls that a task can ask for; nothing for a family without bowls.
@@ -175,6 +180,9 @@ pub struct Task {
     pub conditions: Vec<Condition>,
     /// Whether it may be trained on.
     pub split: Split,
+    /// Block Stacking: only the first so many blocks are within reach, 2 to 7; the others stand aside. `None`: all of
+    /// them, and in families without blocks.
+    pub blocks: Option<u16>,
 }
 
 impl Task {
@@ -188,11 +196,12 @@ impl Task {
     }
 
     /// Counts of a trial, with what `draw` gives for each category; empty for a family without. Of Table Clean-up 1 for
-    /// each bowl that is asked for and 0 for the others, then the forks.
+    /// each bowl that is asked for and 0 for the others, then the forks; of Block Stacking 1 for each block within reach
+    /// and 0 for the others, where there are others.
     pub fn counts(&self, mut draw: impl FnMut() -> u16) -> Vec<u16> {
         let is_asked_for = |bowl: u16| u16::from(self.goals.iter().any(|goal| goal.source == SlotIndex(bowl)));
         match self.family {
-            Family::BlockStacking => Vec::new(),
+            Family::BlockStacking => self.blocks.map_or_else(Vec::new, layout::stacking::counts),
             Family::ObjectSorting => (0..check::N_CATEGORIES).map(|_| draw()).collect(),
             Family::TableCleanup => (0..layout::cleanup::N_BOWLS).map(is_asked_for).chain([draw()]).collect(),
         }

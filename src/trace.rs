@@ -29,6 +29,6 @@ pub use instruction::{
 pub use outcome::{Cause, Outcome};
 pub use push::Push;
 pub use recorder::{CallRecorder, NewCall};
-pub use rules::{CallProblem, TraceError, check_calls};
+pub use rules::{CallProblem, PushProblem, TraceError, check_calls};
 pub use span::{ScopingLabel, Span};
 pub use specification::SpecificationForm;

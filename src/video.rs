@@ -17,6 +17,7 @@ mod gif;
 mod h264;
 mod mp4;
 mod png;
+mod seek;
 
 pub use clip::{write_gif, write_mp4, write_png};
 pub use error::VideoError;
@@ -25,3 +26,4 @@ pub use gif::encode_gif;
 pub use h264::{H264Decoder, H264Encoder, is_key_frame};
 pub use mp4::{Mp4Reader, Mp4Sample, Mp4Writer};
 pub use png::{Rgb, decode_png, encode_png};
+pub use seek::Mp4Pictures;

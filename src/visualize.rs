@@ -10,7 +10,9 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! world/adversary, adversary        pushes of an adversary, where there are any: an arrow and a lane
 //! camera/{front, wrist}             what cameras see
+//! filmed/<camera>                   what the recording's own cameras saw, the first of them what a policy that sees saw
 //! programs/depth_<n>                the stack of running programs, a lane a depth
 //! programs_of_expert/depth_<n>      the same of the demonstration, beside a rollout
 //! agreement                         whether a rollout's decisions are the expert's, until the first that is not
@@ -40,6 +42,7 @@ mod layout;
 mod palette;
 mod pictures;
 mod playback;
+mod pushes;
 mod rrd;
 mod series;
 mod specification;
@@ -54,6 +57,7 @@ use rerun::log::ChunkError;
 
 use crate::artifact::IoError;
 use crate::dataset::Playback;
+use crate::render::CameraConfig;
 use crate::rollout::Divergence;
 use crate::trace::{Actor, Episode};
 use crate::video::VideoError;
@@ -73,11 +77,13 @@ pub struct Replay<'e> {
     pub demonstration: Option<&'e Episode>,
     /// Where a policy first left the expert's decisions; `None` when it never did, and for an expert.
     pub divergence: Option<Divergence>,
+    /// The cameras that filmed the episode. A policy that sees looked with the first of them.
+    pub cameras: &'e [CameraConfig],
 }
 
 impl<'e> From<&'e Episode> for Replay<'e> {
     fn from(episode: &'e Episode) -> Self {
-        Self { episode, demonstration: None, divergence: None }
+        Self { episode, demonstration: None, divergence: None, cameras: &[] }
     }
 }
 
@@ -255,14 +261,15 @@ fn each_store(
 }
 
 fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
-    let &Replay { episode, demonstration, divergence } = replay;
+    let &Replay { episode, demonstration, divergence, cameras: _ } = replay;
     let specification = specification_of(episode, demonstration)?;
     let mut store = Store::recording(&text::recording_id(replay));
     text::put_properties(&mut store, replay)?;
     text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
-    pictures::put(&mut store, episode)?;
+    pushes::put(&mut store, episode)?;
+    pictures::put(&mut store, replay)?;
     calls::put(&mut store, replay)?;
     lanes::put(&mut store, "programs", episode)?;
     if let Some(demonstration) = demonstration {

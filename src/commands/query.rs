@@ -45,13 +45,23 @@ fn tables(path: &Path) -> anyhow::Result<Tables> {
 }
 
 fn add(path: &Path, kind: Kind, tables: &mut Tables) -> anyhow::Result<()> {
-    let metrics = path.join("metrics.parquet");
+    let there = |file: &str| Some(path.join(file)).filter(|path| path.exists());
     match kind {
         Kind::Dataset => tables.add_dataset(path)?,
-        Kind::Rollouts => tables.add_rollouts(&path.join("rollouts.parquet")),
-        Kind::Model if metrics.exists() => {
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-            tables.add_metrics(&metrics, &name.unwrap_or_default());
+        Kind::Rollouts => {
+            tables.add_rollouts(&path.join("rollouts.parquet"));
+            if let Some(path) = there("detections.parquet") {
+                tables.add_detections(&path);
+            }
+        }
+        Kind::Model => {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            if let Some(path) = there("metrics.parquet") {
+                tables.add_metrics(&path, &name);
+            }
+            if let Some(path) = there("detector_metrics.parquet") {
+                tables.add_detector_metrics(&path, &name);
+            }
         }
         _ => {}
     }

@@ -12,9 +12,11 @@ use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::{Playback, play_back};
 use crate::pipeline::{self, Verification};
 use crate::recording::ShardReader;
+use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
+use crate::scene::BodyIndex;
 use crate::task::TaskSet;
-use crate::trace::{Actor, Episode};
+use crate::trace::{Actor, Episode, Push};
 use crate::visualize::{self, Replay};
 
 /// An episode, with what is to be shown beside it.
@@ -25,6 +27,7 @@ struct Found {
     episode: Episode,
     demonstration: Option<Episode>,
     divergence: Option<Divergence>,
+    cameras: Vec<CameraConfig>,
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
@@ -99,8 +102,8 @@ fn verify(args: &ReplayArgs, found: &[Found]) -> anyhow::Result<CommandOutcome> 
 
 impl Found {
     fn replay(&self) -> Replay<'_> {
-        let Self { episode, demonstration, divergence, .. } = self;
-        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence }
+        let Self { episode, demonstration, divergence, cameras, .. } = self;
+        Replay { episode, demonstration: demonstration.as_ref(), divergence: *divergence, cameras }
     }
 
     /// The frame at which a policy first left the expert's decisions, and its time.
@@ -121,6 +124,10 @@ impl Found {
         if let (Some(divergence), Some((frame, secs))) = (divergence, self.divergent_frame()) {
             words.push_str(&format!("; leaves the expert at {secs:.1} s, frame {frame}: {divergence}"));
         }
+        if !episode.pushes.is_empty() {
+            let times = episode.pushes.iter().map(|push| format!("{:.1} s", secs_of(episode, push.frames.begin)));
+            words.push_str(&format!("; the adversary pushes at {}", times.collect::<Vec<_>>().join(", ")));
+        }
         words
     }
 
@@ -136,8 +143,25 @@ impl Found {
             "calls": self.episode.calls.len(),
             "demonstration": self.demonstration.is_some(),
             "first_divergence": divergence,
+            "pushes": self.episode.pushes.iter().map(|push| push_to_json(&self.episode, push)).collect::<Vec<_>>(),
         })
     }
+}
+
+fn push_to_json(episode: &Episode, push: &Push) -> Value {
+    let name = |body: &BodyIndex| episode.scene.body(*body).name.as_str();
+    json!({
+        "frame": push.frames.begin,
+        "secs": secs_of(episode, push.frames.begin),
+        "body": name(&push.body),
+        "impulse_ns": push.impulse_ns,
+        "toppled": push.toppled.iter().map(name).collect::<Vec<_>>(),
+    })
+}
+
+/// The time of a frame since the episode began, in seconds.
+fn secs_of(episode: &Episode, frame: u32) -> f64 {
+    episode.frames.get(frame as usize).map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
 }
 
 /// The recording that an episode is in, and the episode; counted as [`find`] does.
@@ -158,10 +182,11 @@ fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
             if !(n_episodes..n_episodes + reader.n_episodes()).contains(&number) {
                 continue;
             }
-            let plan = serde_json::from_str(reader.plan_json())
+            let plan: Plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
-            let episode = reader.read_episode(number - n_episodes)?;
-            found.push(Found { number, file: file.clone(), plan, episode, demonstration: None, divergence: None });
+            let (episode, cameras) = (reader.read_episode(number - n_episodes)?, pipeline::cameras_of(&plan));
+            let (file, demonstration, divergence) = (file.clone(), None, None);
+            found.push(Found { number, file, plan, episode, demonstration, divergence, cameras });
         }
         n_episodes += reader.n_episodes();
     }

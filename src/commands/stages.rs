@@ -19,6 +19,10 @@ pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBoo
     } else {
         reports.iter().try_for_each(|report| output::print(&line(report)))?;
     }
+    if args.dry_run {
+        output::note(&left(&reports));
+        return Ok(CommandOutcome::Done);
+    }
     Ok(outcome(&reports))
 }
 
@@ -108,6 +112,17 @@ pub(super) fn line(report: &StageReport) -> String {
     let name = format!("{experiment}{}", report.unit);
     let name = if std::io::stdout().is_terminal() { format!("{name:<52}") } else { name };
     format!("{name}  {what}{episodes}")
+}
+
+/// What a dry run found to do, stage by stage: `left: train 3 of 84, rollout 40 of 620`.
+fn left(reports: &[StageReport]) -> String {
+    let of_stage = |stage: Stage| {
+        let own = || reports.iter().filter(move |report| report.stage == stage);
+        let n_needed = own().filter(|report| report.status == Status::Needed).count();
+        (n_needed > 0).then(|| format!("{} {n_needed} of {}", stage.name(), own().count()))
+    };
+    let stages: Vec<String> = Stage::ALL.into_iter().filter_map(of_stage).collect();
+    if stages.is_empty() { "nothing is left to do".to_owned() } else { format!("left: {}", stages.join(", ")) }
 }
 
 /// Demonstrations that failed are left out of the dataset; rollouts that failed are a result.

@@ -3,12 +3,16 @@
 //! A camera's pictures are the feature `observation.images.NAME`: PNG in a column of `data/` (`struct<bytes, path>`), or
 //! H.264 in `videos/FEATURE/chunk-000/file-000.mp4`, whose samples are copied from the recordings.
 
+mod loader;
 mod measure;
+mod open_files;
+mod places;
 mod read;
 mod statistics;
 mod video;
 mod write;
 
+pub use loader::{Decoded, EpisodeRows, PictureLoader};
 pub(super) use measure::PictureMeasure;
 pub use read::EpisodePictures;
 pub(crate) use statistics::PictureStatistics;

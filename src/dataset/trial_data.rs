@@ -14,8 +14,12 @@ pub struct TrialData {
     pub split: Split,
     /// Which trial of its task.
     pub trial: u32,
+    /// Its episode in the dataset, from 0.
+    pub episode: usize,
     /// How many boundary frames.
     pub n_frames: usize,
+    /// Which rows of the episode its boundary frames are, in order: where its pictures are.
+    pub rows: Vec<u32>,
     /// `[n_frames, 3 * n_slots + 2]`, row by row: [`crate::trace::Observation::to_flat`] of each boundary frame.
     pub observations: Vec<f32>,
     /// The call tree; spans count boundary frames.

@@ -1,5 +1,6 @@
 //! From a configuration to the network of its type.
 
+use burn::module::ModuleDisplay;
 use burn::tensor::Device;
 
 use crate::model::colour_slots::ColourSlots;
@@ -9,6 +10,7 @@ use crate::model::detector::{Detector, PointDetector, VggDetector};
 use crate::model::encoder::Encoder;
 use crate::model::flattened::{FlatEncoder, Flattened};
 use crate::model::instructed::Instructed;
+use crate::model::keypoints::Keypoints;
 use crate::model::layers::Init;
 use crate::model::network::Network;
 use crate::model::npi::{BySlot, ByVector, CallEncoder, Npi};
@@ -26,6 +28,17 @@ pub trait NetworkUse {
 
     /// Does it.
     fn run<N: Network>(self, network: N) -> Self::Output;
+
+    /// The same for a network behind a detector, where that makes a difference.
+    fn run_detecting<D: Detector, N: Network<Percepts = ()> + ModuleDisplay>(
+        self,
+        network: Detecting<D, N>,
+    ) -> Self::Output
+    where
+        Self: Sized,
+    {
+        self.run(network)
+    }
 }
 
 /// Makes a fresh network as configured and hands it on; the same seed gives the same parameters.
@@ -42,11 +55,18 @@ pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &De
         NetworkConfig::Convolved(widths) => {
             wanted.run(Ntp::<FlatEncoder<Convolved>>::new(widths, config.n_slots, seed, device))
         }
-        NetworkConfig::Detected(detector, widths) => {
-            wanted.run(detecting::<PointDetector, ObjectCentric>(detector, widths, config.n_slots, seed, device))
+        NetworkConfig::Keypoints(widths) => {
+            wanted.run(Ntp::<Sighted<Keypoints>>::new(widths, config.n_slots, seed, device))
         }
+        NetworkConfig::Detected(detector, widths) => wanted.run_detecting(detecting::<PointDetector, ObjectCentric>(
+            detector,
+            widths,
+            config.n_slots,
+            seed,
+            device,
+        )),
         NetworkConfig::DetectedFlattened(detector, widths) => {
-            wanted.run(detecting::<VggDetector, Flattened>(detector, widths, config.n_slots, seed, device))
+            wanted.run_detecting(detecting::<VggDetector, Flattened>(detector, widths, config.n_slots, seed, device))
         }
     }
 }

@@ -15,8 +15,13 @@
 //!
 //! Ours, beyond the paper.
 
+mod claims;
 mod clusters;
+mod finding;
 mod foreground;
+
+pub(crate) use claims::Claims;
+pub(crate) use finding::{FIND_WIDTH, Find, Finder};
 
 use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;
@@ -28,6 +33,7 @@ use crate::model::colour_slots::foreground::{COLOUR_WIDTH, Foreground, backgroun
 use crate::model::layers::Init;
 use crate::model::perception::Perception;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::sighted::PerceptNaming;
 use crate::seed::Seed;
 
 /// A score that no softmax lets through.
@@ -72,6 +78,28 @@ impl ColourSlots {
         self.background.val().into_data().try_into_vec().unwrap_or_default()
     }
 
+    /// The pixels of pictures that are no background, and whose they are.
+    pub(crate) fn claims(&self, pictures: &Pictures) -> Claims {
+        let prototypes: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
+        let log_sharpness: Vec<f32> = self.log_sharpness.val().into_data().try_into_vec().unwrap_or_default();
+        let background = self.background();
+        Claims::of(pictures, &background, &foreground(pictures, &background), &prototypes, &log_sharpness)
+    }
+
+    /// The same with the colours of `slots` right behind the robot's, in this order; the others follow.
+    #[must_use]
+    pub(crate) fn with_first(mut self, slots: &[usize]) -> Self {
+        let n_colours = self.prototypes.dims()[1];
+        let others = (1..n_colours).filter(|colour| !slots.contains(colour));
+        let order: Vec<usize> = std::iter::once(0).chain(slots.iter().copied()).chain(others).collect();
+        let device = self.device();
+        let before: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
+        let columns = before.chunks_exact(n_colours).flat_map(|feature| order.iter().map(|&colour| feature[colour]));
+        let data = TensorData::new(columns.collect::<Vec<_>>(), [COLOUR_WIDTH, n_colours]);
+        self.prototypes = replaced(&self.prototypes, data, &device);
+        self
+    }
+
     /// Minus the sharpened squared distance of each point's colour to each prototype, `[F, P, K]`.
     fn scores(&self, seen: &Foreground) -> Tensor<3> {
         let device = self.device();
@@ -90,6 +118,8 @@ impl ColourSlots {
 
 impl Perception for ColourSlots {
     type Config = ColourSlotsConfig;
+    type Looks = ();
+    type Naming = PerceptNaming;
 
     fn new(config: &ColourSlotsConfig, init: &mut Init) -> Self {
         let log_sharpness = init.filled([1, config.colours], SHARPNESS.ln());
@@ -121,7 +151,7 @@ impl Perception for ColourSlots {
         self
     }
 
-    fn look(&self, pictures: &Pictures) -> Tensor<3> {
+    fn look(&self, pictures: &Pictures) -> (Tensor<3>, ()) {
         let seen = foreground(pictures, &self.background());
         let scores = self.scores(&seen);
         let places = TensorData::new(seen.places(), [seen.n_pictures, 2, seen.n_points]);
@@ -132,7 +162,7 @@ impl Perception for ColourSlots {
         let variances = (squares - centres.clone().powf_scalar(2.0)).sum_dim(1).clamp_min(0.0); // [F, 1, K]
         let full = MASS_PIXELS * (pictures.width * pictures.height) as f32;
         let masses = scores.exp().sum_dim(1) / full;
-        Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2)
+        (Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2), ())
     }
 }
 

@@ -6,6 +6,7 @@ use crate::model::colour_slots::ColourSlotsConfig;
 use crate::model::detector::{PointDetectorConfig, VggDetectorConfig};
 use crate::model::flattened::FlattenedConfig;
 use crate::model::instructed::InstructedConfig;
+use crate::model::keypoints::KeypointsConfig;
 use crate::model::object_centric::ObjectCentricConfig;
 use crate::model::sighted::SightedConfig;
 use crate::model::variant::{EncoderKind, Variant};
@@ -31,6 +32,8 @@ pub enum NetworkConfig {
     ColourSlots(SightedConfig<ColourSlotsConfig>),
     /// Of [`EncoderKind::Convolved`].
     Convolved(ConvolvedConfig),
+    /// Of [`EncoderKind::Keypoints`].
+    Keypoints(SightedConfig<KeypointsConfig>),
     /// Of [`EncoderKind::Detected`].
     Detected(PointDetectorConfig, ObjectCentricConfig),
     /// Of [`EncoderKind::DetectedFlattened`].
@@ -48,13 +51,15 @@ impl NetworkConfig {
                 Self::ColourSlots(SightedConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }))
             }
             (_, EncoderKind::Convolved) => Self::Convolved(ConvolvedConfig::of_pixels(64)),
+            (_, EncoderKind::Keypoints) => Self::Keypoints(SightedConfig::of(KeypointsConfig::of(64, 0))),
             (_, EncoderKind::Detected) => Self::Detected(
                 PointDetectorConfig::of(ColourSlotsConfig { pixels: 64, colours: 0 }),
                 ObjectCentricConfig::default(),
             ),
-            (_, EncoderKind::DetectedFlattened) => {
-                Self::DetectedFlattened(VggDetectorConfig { pixels: 64, narrowed: 8 }, FlattenedConfig::default())
-            }
+            (_, EncoderKind::DetectedFlattened) => Self::DetectedFlattened(
+                VggDetectorConfig { pixels: 64, narrowed: VggDetectorConfig::NARROWED },
+                FlattenedConfig::default(),
+            ),
         }
     }
 
@@ -66,11 +71,54 @@ impl NetworkConfig {
         match self {
             Self::ColourSlots(config) => Self::ColourSlots(SightedConfig { perception, ..config }),
             Self::Convolved(config) => Self::Convolved(ConvolvedConfig { pixels, ..config }),
-            Self::Detected(config, widths) => Self::Detected(PointDetectorConfig { perception, ..config }, widths),
+            Self::Keypoints(config) => {
+                let perception = KeypointsConfig { pixels, slots: n_slots, ..config.perception };
+                Self::Keypoints(SightedConfig { perception, ..config })
+            }
+            Self::Detected(_, widths) => Self::Detected(PointDetectorConfig::of(perception), widths),
             Self::DetectedFlattened(config, widths) => {
                 Self::DetectedFlattened(VggDetectorConfig { pixels, ..config }, widths)
             }
             other => other,
+        }
+    }
+
+    /// The same with another number of colours to be told apart; widths without colours stay as they are.
+    #[must_use]
+    pub fn telling_apart(self, colours: usize) -> Self {
+        match self {
+            Self::ColourSlots(config) => {
+                let perception = ColourSlotsConfig { colours, ..config.perception };
+                Self::ColourSlots(SightedConfig { perception, ..config })
+            }
+            Self::Detected(config, widths) => {
+                let perception = ColourSlotsConfig { colours, ..config.perception };
+                Self::Detected(PointDetectorConfig { perception, ..config }, widths)
+            }
+            other => other,
+        }
+    }
+
+    /// The same with VGG16's widths divided by another number; other widths stay as they are.
+    #[must_use]
+    pub fn narrowed(self, narrowed: usize) -> Self {
+        match self {
+            Self::DetectedFlattened(config, widths) => {
+                Self::DetectedFlattened(VggDetectorConfig { narrowed, ..config }, widths)
+            }
+            other => other,
+        }
+    }
+
+    /// Width and height of the pictures that the network is made for; `None` where it sees none.
+    pub fn pixels(&self) -> Option<usize> {
+        match self {
+            Self::ObjectCentric(_) | Self::Flattened(_) | Self::Instructed(_) => None,
+            Self::ColourSlots(config) => Some(config.perception.pixels),
+            Self::Convolved(config) => Some(config.pixels),
+            Self::Detected(config, _) => Some(config.perception.pixels),
+            Self::Keypoints(config) => Some(config.perception.pixels),
+            Self::DetectedFlattened(config, _) => Some(config.pixels),
         }
     }
 
@@ -79,9 +127,11 @@ impl NetworkConfig {
         match self {
             Self::ObjectCentric(_) | Self::Flattened(_) => SpecificationForm::Trajectories,
             Self::Instructed(_) => SpecificationForm::Instructions,
-            Self::ColourSlots(_) | Self::Convolved(_) | Self::Detected(..) | Self::DetectedFlattened(..) => {
-                SpecificationForm::Video
-            }
+            Self::ColourSlots(_)
+            | Self::Convolved(_)
+            | Self::Keypoints(_)
+            | Self::Detected(..)
+            | Self::DetectedFlattened(..) => SpecificationForm::Video,
         }
     }
 
@@ -93,6 +143,7 @@ impl NetworkConfig {
             Self::Instructed(_) => variant == Variant::Ntp,
             Self::ColourSlots(_) => variant.encoder() == EncoderKind::ColourSlots,
             Self::Convolved(_) => variant.encoder() == EncoderKind::Convolved,
+            Self::Keypoints(_) => variant.encoder() == EncoderKind::Keypoints,
             Self::Detected(..) => variant.encoder() == EncoderKind::Detected,
             Self::DetectedFlattened(..) => variant.encoder() == EncoderKind::DetectedFlattened,
         }

@@ -2,8 +2,8 @@
 //!
 //! # Invariants
 //!
-//! The two learn apart: no gradient of a decision reaches the detector, none of a position the network behind it, which
-//! learns on what the detector finds at that time.
+//! The two learn apart: first the detector, then the network behind it on what the finished detector finds. No gradient
+//! of a decision reaches the detector, none of a position the network behind it.
 //!
 //! # Source
 //!
@@ -15,10 +15,9 @@ use burn::tensor::{Device, Tensor};
 use crate::model::decisions::Decisions;
 use crate::model::detector::{self, Detector};
 use crate::model::network::{CoreOutput, Given, Network};
-use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::pictures::Pictures;
 use crate::model::windows::Windows;
 use crate::program::Program;
-use crate::seed::Seed;
 use crate::trace::{Observation, Span};
 
 /// A detector and a network behind it.
@@ -50,6 +49,16 @@ impl<D: Detector, N: Network<Percepts = ()>> Detecting<D, N> {
     pub fn new(detector: D, programmer: N, n_slots: usize) -> Self {
         Self { detector, programmer, n_slots }
     }
+
+    /// Each by itself.
+    pub fn into_parts(self) -> (D, N) {
+        (self.detector, self.programmer)
+    }
+}
+
+/// Observation rows of pictures, as a detector finds them: `[F, 3 N + 2]` in metres.
+pub fn detected_rows<D: Detector>(detector: &D, pictures: &Pictures) -> Vec<f32> {
+    if pictures.n > 0 { detector::rows(detector.detect(pictures)) } else { Vec::new() }
 }
 
 impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecting<D, N> {
@@ -61,18 +70,12 @@ impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecti
     type Reading = N::Reading;
     type Recall = N::Recall;
 
-    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
-        self.detector = self.detector.acquainted(sample, seed);
-        self
-    }
-
-    fn detection_loss(&self, pictures: &Pictures, rows: &[f32]) -> Option<Tensor<1>> {
-        (pictures.n > 0).then(|| detector::loss(self.detector.detect(pictures), self.n_slots, rows))
-    }
-
     fn perceive(&self, pictures: &Pictures) -> Detections {
-        let rows = if pictures.n > 0 { detector::rows(self.detector.detect(pictures)) } else { Vec::new() };
-        Detections { width: Observation::width(self.n_slots), rows }
+        Detections { width: Observation::width(self.n_slots), rows: detected_rows(&self.detector, pictures) }
+    }
+
+    fn detected(percepts: &Detections) -> Option<&[f32]> {
+        Some(&percepts.rows)
     }
 
     fn demonstration(&self, windows: &Windows, percepts: &Detections) -> N::Demonstration {

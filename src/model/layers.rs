@@ -52,6 +52,12 @@ impl Init {
         Linear { weight, bias: Some(self.parameter([n_outputs], bound)) }
     }
 
+    /// A layer whose weights are uniform within `bound`.
+    pub(crate) fn linear_within(&mut self, n_inputs: usize, n_outputs: usize, bound: f32) -> Linear {
+        let weight = self.parameter([n_inputs, n_outputs], bound);
+        Linear { weight, bias: Some(self.filled([n_outputs], 0.0)) }
+    }
+
     /// A part of a layer that reads a concatenation of `n_concatenated` features, `n_inputs` of them here. The parts'
     /// outputs are added, which spares the concatenation and lets each part be computed where it is small.
     pub(crate) fn part(&mut self, n_inputs: usize, n_outputs: usize, n_concatenated: usize) -> Linear {

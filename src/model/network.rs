@@ -63,14 +63,13 @@ pub trait Network: Module + Sync + 'static {
         self
     }
 
-    /// What a detector has to learn of pictures, beside what is decided: its loss against observation rows of the same
-    /// frames. Nothing where there is no detector.
-    fn detection_loss(&self, _pictures: &Pictures, _rows: &[f32]) -> Option<Tensor<1>> {
-        None
-    }
-
     /// Looks at pictures.
     fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
+
+    /// The observation rows that a detector found in the pictures, `[F, 3 N + 2]`; nothing where there is none.
+    fn detected(_percepts: &Self::Percepts) -> Option<&[f32]> {
+        None
+    }
 
     /// The part that does not depend on the state: of every frame by itself, so that windows can be cut from it. With
     /// pictures the rows of a window say which of the percepts it shows.

@@ -56,6 +56,14 @@ pub trait CallEncoder: Module + ModuleDisplay + Sync + Sized + 'static {
 }
 
 /// The network of the variants `npi` and `npi_paper`.
+///
+/// # Shapes
+///
+/// ```text
+/// states [B, N], slots called with                 ─► state [B, H]
+/// state, program + task [B, program]               ─► LSTM: hidden [B, H] ─► programs [B, P], end [B, 1]
+/// slots, program + task, hidden                    ─► slots of each argument [B * arguments, N]
+/// ```
 #[derive(Module, Debug)]
 pub struct Npi<E: Module> {
     encoder: E,

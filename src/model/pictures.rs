@@ -1,5 +1,7 @@
 //! What a network that sees is given to look at.
 
+use burn::tensor::{Device, Tensor, TensorData};
+
 /// Colour pictures of one size, side by side.
 ///
 /// # Shapes
@@ -42,6 +44,13 @@ impl Pictures {
     /// Each by itself.
     pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
         self.rgb.chunks_exact(self.n_bytes().max(1))
+    }
+
+    /// Values from -1 to 1 as convolutions take them: `[n, 3, height, width]`.
+    pub(crate) fn to_tensor(&self, device: &Device) -> Tensor<4> {
+        let values: Vec<f32> = self.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
+        let shape = [self.n, self.height, self.width, 3];
+        Tensor::<4>::from_data(TensorData::new(values, shape), device).permute([0, 3, 1, 2])
     }
 
     /// Bytes of one.

@@ -23,6 +23,20 @@ use crate::seed::Seed;
 use crate::trace::Span;
 
 /// An encoder, a treatment of windows, a core and an argument decoder, put together.
+///
+/// # Shapes
+///
+/// Of every variant below, with the widths that its encoder gives:
+///
+/// ```text
+/// windows of the specification, states [B, N]     ─► frames [B, T, frame], context [B, context], state [B, state]
+/// context, program [B, program], state            ─► core: hidden [B, hidden] ─► programs [B, P], end [B, 1]
+/// frames, program, view [B, view]                 ─► labels [B, T, 4]; `ntp` and `ntp_gru` alone
+/// the specification, program, view or hidden      ─► slots [B, N]
+/// ```
+///
+/// `view` is the state, or the hidden vector of a recurrent core, whose `B` steps of calls are packed as
+/// [`Network`] says.
 #[derive(Module, Debug)]
 pub struct Programmer<E: Module, S: Module, C: Module, A: Module> {
     encoder: E,

@@ -20,12 +20,12 @@
 use burn::module::{Module, ModuleDisplay};
 use burn::nn::Linear;
 use burn::tensor::activation::relu;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
-use crate::model::perception::{PERCEPT_WIDTH, Perception};
+use crate::model::perception::{Looks as _, PERCEPT_WIDTH, Perception};
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::summary::summarize;
 use crate::model::vectors::picked;
@@ -41,6 +41,11 @@ const OBJECT_WIDTH: usize = PLACE_WIDTH + 2 * PERCEPT_WIDTH;
 const LINEAR_GAIN: f32 = 3.0;
 /// A bump has fallen to 1/e at about the width of a block.
 const BUMP_GAIN: f32 = 8.0;
+
+/// Weights of the layer that names the argument lie within this bound to begin with: logits then differ by about one. With
+/// small ones a percept's features get no gradient before names are tied to percepts, nor names before features tell the
+/// percept that is meant: a plateau at guessing, of some hundred steps or many more.
+const NAMING_BOUND: f32 = 0.4;
 
 /// Widths of the encoder of videos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,7 +88,8 @@ pub struct Sighted<P: Module> {
     scope_conv: TemporalConv,
 }
 
-/// Names an object by what the specification and the state show of every percept.
+/// Names an object by what the specification and the state show of every percept: which percept is which object nobody
+/// says.
 #[derive(Module, Debug)]
 pub struct PerceptNaming {
     conv: TemporalConv,
@@ -94,43 +100,56 @@ pub struct PerceptNaming {
 
 /// What every picture gives by itself, `F` pictures of `K` percepts.
 #[derive(Clone, Debug)]
-pub struct Percepts {
+pub struct Percepts<L> {
     /// First layer of pairs as part of a demonstration, and as what is seen now: `[F, K * K, pair]` each.
     pairs: [Tensor<3>; 2],
     /// The same of percepts: `[F, K, H]` each.
     objects: [Tensor<3>; 2],
     /// The state with the robot, `[F, H + PERCEPT_WIDTH]`.
     states: Tensor<2>,
+    /// What is kept besides.
+    looks: L,
 }
 
 /// Percepts of windows.
 #[derive(Clone, Debug)]
-pub struct SightedDemonstration {
+pub struct SightedDemonstration<L> {
     /// `[B, T, K * K, pair]`
     pairs: Tensor<4>,
     /// `[B, T, K, H]`
     objects: Tensor<4>,
     padding: Option<Padding>,
+    /// Of all pictures.
+    looks: L,
+    /// The pictures that each window shows.
+    shown: Vec<Vec<i32>>,
 }
 
 /// Demonstration and state, compared.
 #[derive(Clone, Debug)]
-pub struct SightedReading {
+pub struct SightedReading<L> {
     /// Each percept in each frame, `[B, T, K, H]`.
-    objects: Tensor<4>,
+    pub(crate) objects: Tensor<4>,
     /// Each frame with its neighbours, `[B, T, H]`; zero beyond a window.
     frames: Tensor<3>,
     /// Most and last of the window, `[B, 2 H]`.
     context: Tensor<2>,
     /// The state with the robot, `[B, H + PERCEPT_WIDTH]`.
     state: Tensor<2>,
-    padding: Option<Padding>,
+    pub(crate) padding: Option<Padding>,
+    /// What is kept besides of the window's first and last frame.
+    pub(crate) ends: [L; 2],
 }
 
 impl<P: Perception> Sighted<P> {
     /// Each percept in each frame, compared with its pairs and itself now: `[B, T, K, H]`.
-    fn compare(&self, demonstration: &SightedDemonstration, pairs_now: Tensor<3>, objects_now: Tensor<3>) -> Tensor<4> {
-        let SightedDemonstration { pairs, objects, padding: _ } = demonstration;
+    fn compare(
+        &self,
+        demonstration: &SightedDemonstration<P::Looks>,
+        pairs_now: Tensor<3>,
+        objects_now: Tensor<3>,
+    ) -> Tensor<4> {
+        let SightedDemonstration { pairs, objects, .. } = demonstration;
         let [n_batch, n_frames, n_percepts, _] = objects.dims();
         let compared = self.pair.forward(relu(pairs.clone() + pairs_now.unsqueeze_dim(1))); // [B, T, K * K, pair]
         let n_pair = compared.dims()[3];
@@ -143,10 +162,10 @@ impl<P: Perception> Sighted<P> {
 
 impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
     type Config = SightedConfig<P::Config>;
-    type Percepts = Percepts;
-    type Demonstration = SightedDemonstration;
-    type Reading = SightedReading;
-    type Argument = PerceptNaming;
+    type Percepts = Percepts<P::Looks>;
+    type Demonstration = SightedDemonstration<P::Looks>;
+    type Reading = SightedReading<P::Looks>;
+    type Argument = P::Naming;
 
     fn new(config: &Self::Config, _n_slots: usize, init: &mut Init) -> Self {
         let &SightedConfig { perception, pair_width, width, scope_kernel, .. } = config;
@@ -177,15 +196,15 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
         self
     }
 
-    fn perceive(&self, pictures: &Pictures) -> Percepts {
-        let seen = self.perception.look(pictures); // [F, K, PERCEPT_WIDTH]
+    fn perceive(&self, pictures: &Pictures) -> Percepts<P::Looks> {
+        let (seen, looks) = self.perception.look(pictures); // [F, K, PERCEPT_WIDTH]
         let [n_pictures, n_percepts, _] = seen.dims();
         let places = seen.clone().narrow(2, 0, 2);
         let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
         let relative = place_features(places.clone() - robot.clone().narrow(2, 0, 2));
-        let looks = seen * LINEAR_GAIN;
+        let appearance = seen * LINEAR_GAIN;
         let robots = (robot * LINEAR_GAIN).expand([n_pictures, n_percepts, PERCEPT_WIDTH]);
-        let objects = Tensor::<3>::cat(vec![relative, looks, robots.clone()], 2);
+        let objects = Tensor::<3>::cat(vec![relative, appearance, robots.clone()], 2);
         let columns: Tensor<4> = places.clone().unsqueeze_dim(1);
         let rows: Tensor<4> = places.unsqueeze_dim(2);
         let pairs = place_features(rows - columns).reshape([n_pictures, n_percepts * n_percepts, PLACE_WIDTH]);
@@ -196,10 +215,11 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
             pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
             objects: [self.object_demonstration.forward(hidden.clone()), self.object_state.forward(hidden)],
             states: Tensor::cat(vec![state, robot], 1),
+            looks,
         }
     }
 
-    fn demonstration(&self, windows: &Windows, percepts: &Percepts) -> SightedDemonstration {
+    fn demonstration(&self, windows: &Windows, percepts: &Percepts<P::Looks>) -> SightedDemonstration<P::Looks> {
         let device = self.device();
         let shown = picked(windows.picture_rows(), &device);
         let gather = |all: &Tensor<3>| {
@@ -210,15 +230,29 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
             pairs: gather(&percepts.pairs[0]),
             objects: gather(&percepts.objects[0]),
             padding: windows.padding(&device),
+            looks: percepts.looks.clone(),
+            shown: windows.pictures(),
         }
     }
 
-    fn window(demonstration: &SightedDemonstration, span: Span) -> SightedDemonstration {
+    fn window(demonstration: &SightedDemonstration<P::Looks>, span: Span) -> SightedDemonstration<P::Looks> {
         let cut = |frames: &Tensor<4>| frames.clone().narrow(1, span.begin as usize, span.len());
-        SightedDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
+        let shown = |window: &Vec<i32>| window[span.begin as usize..span.end as usize].to_vec();
+        SightedDemonstration {
+            pairs: cut(&demonstration.pairs),
+            objects: cut(&demonstration.objects),
+            padding: None,
+            looks: demonstration.looks.clone(),
+            shown: demonstration.shown.iter().map(shown).collect(),
+        }
     }
 
-    fn read(&self, demonstration: &SightedDemonstration, states: &[f32], percepts: &Percepts) -> SightedReading {
+    fn read(
+        &self,
+        demonstration: &SightedDemonstration<P::Looks>,
+        states: &[f32],
+        percepts: &Percepts<P::Looks>,
+    ) -> SightedReading<P::Looks> {
         let now = picked(states, &self.device());
         let pairs_now = percepts.pairs[1].clone().select(0, now.clone());
         let objects_now = percepts.objects[1].clone().select(0, now.clone());
@@ -226,18 +260,23 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
         let padding = demonstration.padding.as_ref();
         let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
         let state = percepts.states.clone().select(0, now);
-        SightedReading { objects, frames, context, state, padding: demonstration.padding.clone() }
+        let device = self.device();
+        let ends = [<[i32]>::first, <[i32]>::last].map(|end| {
+            let shown: Vec<i32> = demonstration.shown.iter().map(|window| end(window).copied().unwrap_or(0)).collect();
+            demonstration.looks.select(Tensor::from_data(TensorData::new(shown, [demonstration.shown.len()]), &device))
+        });
+        SightedReading { objects, frames, context, state, padding: demonstration.padding.clone(), ends }
     }
 
-    fn context(reading: &SightedReading) -> Tensor<2> {
+    fn context(reading: &SightedReading<P::Looks>) -> Tensor<2> {
         reading.context.clone()
     }
 
-    fn state(reading: &SightedReading) -> Tensor<2> {
+    fn state(reading: &SightedReading<P::Looks>) -> Tensor<2> {
         reading.state.clone()
     }
 
-    fn frames(reading: &SightedReading) -> Tensor<3> {
+    fn frames(reading: &SightedReading<P::Looks>) -> Tensor<3> {
         with_most_before(reading.frames.clone())
     }
 
@@ -254,11 +293,17 @@ impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
             conv: init.temporal_conv(argument_kernel, width, width),
             object: init.part(2 * width, width, 2 * width + n_context),
             context: init.linear(n_context, width),
-            slots: init.linear(P::n_percepts(&perception) * width, n_slots),
+            slots: init.linear_within(P::n_percepts(&perception) * width, n_slots, NAMING_BOUND),
         }
     }
 
-    fn forward(&self, reading: &SightedReading, program: Tensor<2>, _view: Tensor<2>, hidden: Tensor<2>) -> Tensor<2> {
+    fn forward(
+        &self,
+        reading: &SightedReading<P::Looks>,
+        program: Tensor<2>,
+        _view: Tensor<2>,
+        hidden: Tensor<2>,
+    ) -> Tensor<2> {
         let padding = reading.padding.as_ref();
         let objects = Padding::mask_objects(padding, reading.objects.clone());
         let last = Padding::last_objects(padding, objects.clone());

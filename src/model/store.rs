@@ -138,6 +138,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         ("family", config.family.name().to_owned(), wanted.family.name().to_owned()),
         ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
         ("n_slots", config.n_slots.to_string(), wanted.n_slots.to_string()),
+        ("pixels across a picture", pixels(config), pixels(wanted)),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
         Some((field, found, expected)) => {
@@ -145,6 +146,10 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         }
         None => Ok(()),
     }
+}
+
+fn pixels(config: &ModelConfig) -> String {
+    config.network.pixels().map_or("none".to_owned(), |pixels| pixels.to_string())
 }
 
 /// Loads a trained model for inference and hands its network on.

@@ -42,6 +42,9 @@ pub enum Variant {
     NtpVidE2e,
     /// The same, which it sees through the paper's convolutions, as one vector.
     NtpVidE2ePaper,
+    /// The same, which it sees as keypoints of learned convolutions: things may differ in what is written on them alone,
+    /// and the camera may stand elsewhere in each episode.
+    NtpVidE2eGeneral,
     /// NTP behind a detector on colour slots.
     NtpVidDetector,
     /// NTP with the paper's encoder behind a detector of VGG16's shape.
@@ -76,6 +79,8 @@ pub enum EncoderKind {
     ColourSlots,
     /// As pictures, each as one vector: the paper's.
     Convolved,
+    /// As pictures, in which learned convolutions find each slot's object.
+    Keypoints,
     /// Slot by slot, as detected in pictures.
     Detected,
     /// As one vector, as detected in pictures: the paper's.
@@ -84,7 +89,7 @@ pub enum EncoderKind {
 
 impl Variant {
     /// Every variant.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Ntp,
         Self::NtpPaper,
         Self::NtpGru,
@@ -99,6 +104,7 @@ impl Variant {
         Self::NpiPaper,
         Self::NtpVidE2e,
         Self::NtpVidE2ePaper,
+        Self::NtpVidE2eGeneral,
         Self::NtpVidDetector,
         Self::NtpVidDetectorPaper,
     ];
@@ -120,6 +126,7 @@ impl Variant {
             Self::NpiPaper => "npi_paper",
             Self::NtpVidE2e => "ntp_vid_e2e",
             Self::NtpVidE2ePaper => "ntp_vid_e2e_paper",
+            Self::NtpVidE2eGeneral => "ntp_vid_e2e_general",
             Self::NtpVidDetector => "ntp_vid_detector",
             Self::NtpVidDetectorPaper => "ntp_vid_detector_paper",
         }
@@ -132,6 +139,7 @@ impl Variant {
             | Self::NtpPaper
             | Self::NtpVidE2e
             | Self::NtpVidE2ePaper
+            | Self::NtpVidE2eGeneral
             | Self::NtpVidDetector
             | Self::NtpVidDetectorPaper => Architecture::Ntp,
             Self::NtpGru | Self::NtpGruPaper => Architecture::NtpGru,
@@ -156,6 +164,7 @@ impl Variant {
             | Self::NpiPaper => EncoderKind::Flattened,
             Self::NtpVidE2e => EncoderKind::ColourSlots,
             Self::NtpVidE2ePaper => EncoderKind::Convolved,
+            Self::NtpVidE2eGeneral => EncoderKind::Keypoints,
             Self::NtpVidDetector => EncoderKind::Detected,
             Self::NtpVidDetectorPaper => EncoderKind::DetectedFlattened,
         }
@@ -164,6 +173,11 @@ impl Variant {
     /// Whether it is given pictures in place of positions.
     pub fn sees(self) -> bool {
         !matches!(self.encoder(), EncoderKind::ObjectCentric | EncoderKind::Flattened)
+    }
+
+    /// Whether a detector is before it, which is trained first.
+    pub fn detects(self) -> bool {
+        matches!(self.encoder(), EncoderKind::Detected | EncoderKind::DetectedFlattened)
     }
 
     /// The form of task specification that it reads, when another is asked for where it has a choice.

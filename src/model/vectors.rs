@@ -130,10 +130,8 @@ impl Vectors for Convolved {
 
     /// `F` pictures → `[F, features]`.
     fn perceive(&self, pictures: &Pictures) -> Tensor<2> {
-        let values: Vec<f32> = pictures.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
-        let shape = [pictures.n, pictures.height, pictures.width, 3];
-        let rows = Tensor::<4>::from_data(TensorData::new(values, shape), &self.layers[0].weight.device());
-        let seen = self.layers.iter().fold(rows.permute([0, 3, 1, 2]), |seen, layer| relu(layer.forward(seen)));
+        let pixels = pictures.to_tensor(&self.layers[0].weight.device());
+        let seen = self.layers.iter().fold(pixels, |seen, layer| relu(layer.forward(seen)));
         seen.flatten(1, 3)
     }
 

@@ -71,6 +71,12 @@ impl Windows {
         &self.rows
     }
 
+    /// The numbers of the pictures that each window shows, without padding.
+    pub(crate) fn pictures(&self) -> Vec<Vec<i32>> {
+        let windows = self.rows.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);
+        windows.map(|(rows, &length)| rows[..length].iter().map(|&row| row as i32).collect()).collect()
+    }
+
     /// Which words of a vocabulary of `n_words` each sentence has: `[windows * frames, n_words]`.
     pub(crate) fn bags_of_words(&self, n_words: usize) -> Vec<f32> {
         let mut bags = vec![0.0; self.rows.len() / MAX_WORDS * n_words];

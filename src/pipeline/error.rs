@@ -96,6 +96,20 @@ pub enum PipelineError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A model that sees cannot look at an episode.
+    #[error("suite {suite}, episode {episode} (task {task_id}), camera {camera}: {source}")]
+    Sight {
+        /// The suite.
+        suite: String,
+        /// Its episode.
+        episode: u64,
+        /// The task.
+        task_id: String,
+        /// The camera's name.
+        camera: String,
+        /// Why not.
+        source: Box<VideoError>,
+    },
     /// The expert could not demonstrate a task for a suite.
     #[error("suite {suite}: the expert failed all {attempts} attempts to demonstrate {task_id}")]
     NoDemonstration {

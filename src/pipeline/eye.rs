@@ -1,13 +1,13 @@
 //! What models that see look with: the cameras that film the demonstrations.
 
+use crate::artifact::Plan;
 use crate::model::Pictures;
-use crate::pipeline::PipelineError;
 use crate::render::CameraConfig;
 use crate::rollout::{Eye, Sight};
 use crate::scene::Scene;
 use crate::seed::Seed;
 use crate::trace::{Episode, Frame};
-use crate::video::Film;
+use crate::video::{Film, VideoError};
 
 /// A camera before a world. Its pictures are not encoded: PNG would change nothing, and what H.264 loses is lost only
 /// where files are.
@@ -21,19 +21,31 @@ impl Eye for CameraEye {
     }
 }
 
+/// The cameras that filmed a recording's episodes, as its plan tells: the first is what a policy that sees looks with.
+/// None where there were none, or the plan is of another kind.
+pub fn cameras_of(plan: &Plan) -> Vec<CameraConfig> {
+    let cameras = plan.config.pointer("/generate/cameras").or_else(|| plan.config.get("cameras"));
+    cameras.and_then(|cameras| serde_json::from_value(cameras.clone()).ok()).unwrap_or_default()
+}
+
 /// A demonstration as a camera sees it, and the camera before a world of a scene and seed.
+///
+/// # Errors
+///
+/// When the camera sees nothing of the demonstration.
 pub(super) fn sight(
     camera: &CameraConfig,
     demonstration: &Episode,
     scene: &Scene,
     seed: Seed,
-) -> Result<Sight, PipelineError> {
+) -> Result<Sight, VideoError> {
     let mut film = Film::new(camera);
     film.begin_episode(demonstration)?;
     let mut video = nothing(&film);
     for (_, frame) in demonstration.boundary_frames() {
         video.push(&film.draw(&demonstration.scene, &frame.state).rgb);
     }
+    film.check_sight()?;
     film.begin(demonstration.provenance.family, scene, seed)?;
     Ok(Sight { video, eye: Box::new(CameraEye(film)) })
 }

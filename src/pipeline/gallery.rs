@@ -1,80 +1,46 @@
-//! The pictures that a variant that sees learns from: what the first camera filmed of the demonstrations, as recorded.
+//! The pictures that a variant that sees learns from: what the first camera filmed, from the dataset.
 
-use std::collections::BTreeMap;
-
-use crate::dataset::DatasetTrials;
+use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader};
 use crate::model::Pictures;
 use crate::pipeline::PipelineError;
 use crate::pipeline::runner::Context;
-use crate::recording::{CameraPictures, Pictured, ShardReader};
 use crate::training::Gallery;
-use crate::video::decode_png;
 
-/// Pictures of trials' boundary frames, kept as PNG: a thousand tasks of six demonstrations are about 200 MB.
-pub(super) struct Recorded {
-    size: (usize, usize),
-    /// By trial and frame.
-    pictures: Vec<Vec<Vec<u8>>>,
-}
+/// Decoded pictures that are kept for when they are drawn again: about 660 episodes of 33 pictures of 64 x 64 pixels.
+const MOST_BYTES: usize = 1 << 28;
 
-/// Reads the pictures of trials.
+/// The pictures of a dataset's trials, decoded while a step is computed.
+pub(super) struct Streamed(PictureLoader);
+
+/// Finds the pictures of trials in the dataset.
 ///
 /// # Errors
 ///
-/// When a recording cannot be read, or has no pictures of a trial: it was made before there was a camera.
-pub(super) fn read(context: &Context<'_>, trials: &DatasetTrials) -> Result<Recorded, PipelineError> {
-    let spec = &context.pipeline.spec.generate;
-    let camera = spec.cameras.first().map(|camera| camera.name.as_str()).unwrap_or_default();
-    let size = spec.cameras.first().map_or([0, 0], |camera| camera.size_px).map(|pixels| pixels as usize);
-    let positions = trials.trials.iter().enumerate().map(|(at, of)| ((of.task_id.as_str(), of.trial), at));
-    let positions: BTreeMap<(&str, u32), usize> = positions.collect();
-    let mut pictures = vec![Vec::new(); trials.trials.len()];
-    let recordings = context.dir.recordings();
-    for file in &recordings.finished()?.files {
-        for episode in ShardReader::open(&recordings.path().join(&file.path))?.boundaries().pictured() {
-            context.go_on()?;
-            let Pictured { episode, cameras } = episode?;
-            let provenance = &episode.episode().provenance;
-            if let Some(&at) = positions.get(&(provenance.task_id.as_str(), provenance.trial)) {
-                pictures[at] = of_camera(cameras, camera);
-            }
-        }
-    }
-    let counts = trials.trials.iter().zip(&pictures);
-    match counts.into_iter().find(|(trial, pictures)| trial.n_frames != pictures.len()) {
-        None => Ok(Recorded { size: (size[0], size[1]), pictures }),
-        Some((trial, pictures)) => {
-            let (found, wanted) = (pictures.len(), trial.n_frames);
-            let problem = format!(
-                "trial {} of task {} has {found} of {wanted} pictures of camera {camera}",
-                trial.trial, trial.task_id
-            );
-            let (path, key) = (context.pipeline.path.clone(), "generate.cameras".to_owned());
-            Err(PipelineError::Value { path, key, problem })
-        }
-    }
+/// When the dataset has no pictures of the camera, or none of a trial's frame: it was made before there was a camera.
+pub(super) fn open(context: &Context<'_>, trials: &DatasetTrials) -> Result<Streamed, PipelineError> {
+    let camera = context.pipeline.spec.generate.cameras.first();
+    let camera = camera.map(|camera| camera.name.as_str()).unwrap_or_default();
+    let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
+    Ok(Streamed(PictureLoader::open(context.dir.dataset().path(), camera, rows.collect(), MOST_BYTES)?))
 }
 
-fn of_camera(cameras: Vec<CameraPictures>, name: &str) -> Vec<Vec<u8>> {
-    let named = cameras.into_iter().find(|of| of.camera == name);
-    named.map(|of| of.pictures).unwrap_or_default()
-}
-
-impl Gallery for Recorded {
+impl Gallery for Streamed {
     fn size(&self) -> (usize, usize) {
-        self.size
+        let [width, height] = self.0.size_px().map(|pixels| pixels as usize);
+        (width, height)
     }
 
     fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
+        let decoded = self.0.get(trial).map_err(|error| error.to_string())?;
+        let n_bytes = into.n_bytes().max(1);
         for &frame in frames {
-            let png = self.pictures.get(trial).and_then(|pictures| pictures.get(frame));
-            let picture = decode_png(png.ok_or_else(|| format!("frame {frame} has no picture"))?);
-            let picture = picture.map_err(|error| format!("frame {frame}: {error}"))?;
-            if picture.size_px.map(|pixels| pixels as usize) != [self.size.0, self.size.1] {
-                return Err(format!("frame {frame}: a picture of {:?} pixels, not {:?}", picture.size_px, self.size));
-            }
-            into.push(&picture.bytes);
+            let picture = decoded.chunks_exact(n_bytes).nth(frame);
+            into.push(picture.ok_or_else(|| format!("frame {frame} has no picture"))?);
         }
         Ok(())
+    }
+
+    fn announce(&self, trials: &[usize]) {
+        self.0.announce(trials);
     }
 }

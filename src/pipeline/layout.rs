@@ -48,7 +48,7 @@ impl RunDir {
         self.stage(Stage::Convert, "dataset")
     }
 
-    /// `models/<variant>-seed<k>/`.
+    /// `models/<variant>[-instructions][-<tag>][-tasks<n>]-seed<k>/`.
     pub fn model(&self, name: &str) -> StageDir {
         self.stage(Stage::Train, &format!("models/{name}"))
     }
@@ -71,5 +71,6 @@ pub(super) fn model_name(spec: &ModelSpec, seed: u64) -> String {
         form @ SpecificationForm::Instructions => format!("-{form}"),
     };
     let tasks = spec.train_tasks.map(|tasks| format!("-tasks{tasks}")).unwrap_or_default();
-    format!("{}{specification}{tasks}-seed{seed}", spec.variant)
+    let tag = spec.tag.as_ref().map(|tag| format!("-{tag}")).unwrap_or_default();
+    format!("{}{specification}{tag}{tasks}-seed{seed}", spec.variant)
 }

@@ -8,15 +8,18 @@ use crate::artifact::{FileEntry, IoError, Plan, Receipt};
 use crate::model;
 use crate::pipeline::costs::Costs;
 use crate::pipeline::runner::{Context, Options, Part, Unit};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout, tasks, train};
-use crate::report::{self, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train};
+use crate::render::{CameraConfig, Randomization};
+use crate::report::{
+    self, DetectionsInput, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values,
+};
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
 /// What a report holds.
 const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
 /// Version of what a report says, beside that of the program.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let mut inputs = BTreeMap::new();
@@ -79,13 +82,28 @@ fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
 fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
     let experiment = &context.pipeline.spec.name;
     let rollouts = rollout::units(context)?;
-    let paths = rollouts.iter().map(|unit| unit.dir.path().join(rollout::TABLE));
-    inputs.rollouts.extend(paths.map(|path| RolloutsInput { experiment: experiment.clone(), path }));
+    inputs.rollouts.extend(rollouts.iter().map(|unit| RolloutsInput {
+        experiment: experiment.clone(),
+        tag: tag_of(context, unit),
+        path: unit.dir.path().join(rollout::TABLE),
+    }));
+    for unit in &rollouts {
+        if unit.dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
+            let path = unit.dir.path().join(detections::TABLE);
+            inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
+        }
+    }
     let costs = Costs::read(context.dir)?;
     inputs.metrics.extend(trainings(context, &costs)?);
     inputs.facts.extend(facts(context)?);
     inputs.costs.extend(stage_costs(context, &costs, &mut inputs.commits)?);
     Ok(())
+}
+
+/// The tag of the model that acts in a unit of the rollout stage.
+fn tag_of(context: &Context<'_>, unit: &Unit) -> Option<String> {
+    let Part::Suite { actor: Some(actor), .. } = unit.part else { return None };
+    context.pipeline.spec.models[actor.model].tag.clone()
 }
 
 fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
@@ -98,6 +116,7 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         let model = ModelSummary {
             experiment: context.pipeline.spec.name.clone(),
             variant: spec.variant.name().to_owned(),
+            tag: spec.tag.clone(),
             train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
             specification: spec.specification().name().to_owned(),
             seed: seed as i64,
@@ -140,12 +159,30 @@ fn facts(context: &Context<'_>) -> Result<Vec<Fact>, PipelineError> {
     let recordings = context.dir.recordings().finished()?;
     let dataset = context.dir.dataset().finished()?;
     let fact = |name: &str, value: String| Fact { experiment: spec.name.clone(), name: name.to_owned(), value };
-    Ok(vec![
+    let mut facts = vec![
         fact("run seed", spec.seed.to_string()),
         fact("task family", spec.tasks.family.name().to_owned()),
         fact("training tasks", task_set.of_split(Split::Seen).count().to_string()),
         fact("unseen tasks", task_set.of_split(Split::Unseen).count().to_string()),
         fact("expert demonstrations", format!("{}, {} failed", recordings.episodes, recordings.failed)),
         fact("episodes in the dataset", dataset.episodes.to_string()),
-    ])
+    ];
+    facts.extend(spec.generate.cameras.iter().map(|camera| fact(&format!("camera {}", camera.name), seen(camera))));
+    Ok(facts)
+}
+
+/// What a camera's pictures are, in words.
+fn seen(camera: &CameraConfig) -> String {
+    let CameraConfig { size_px: [width, height], randomize, .. } = camera;
+    let Randomization { light, color, camera_m, camera_rad, one_color } = randomize;
+    let mut words = format!("{width} x {height} pixels");
+    let shares =
+        [("light", light, ""), ("colours", color, ""), ("place", camera_m, " m"), ("angle", camera_rad, " rad")];
+    for (what, most, unit) in shares.into_iter().filter(|(_, most, _)| **most > 0.0) {
+        words.push_str(&format!(", {what} changed by up to {most}{unit}"));
+    }
+    if *one_color {
+        words.push_str(", one colour for all that moves");
+    }
+    words
 }

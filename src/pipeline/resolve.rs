@@ -8,8 +8,10 @@ use crate::artifact;
 use crate::model::Decoder;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
-use crate::render::PictureFormat;
-use crate::task::{Family, Split, split_limits};
+use crate::task::{Family, Split};
+
+/// So many tasks are held out at most when the pipeline file says nothing.
+const MAX_DEFAULT_UNSEEN: u32 = 1000;
 
 /// A checked pipeline.
 #[derive(Clone, Debug)]
@@ -50,11 +52,8 @@ impl Pipeline {
 
     /// How many tasks are held out when drawn.
     pub fn n_unseen(&self) -> u32 {
-        let default = match self.spec.tasks.family {
-            Family::BlockStacking => 1000,
-            Family::ObjectSorting | Family::TableCleanup => split_limits(self.spec.tasks.family).1,
-        };
-        self.spec.tasks.unseen.unwrap_or(default)
+        let tasks = &self.spec.tasks;
+        tasks.unseen.unwrap_or_else(|| tasks.pool().limits(tasks.train).1.min(MAX_DEFAULT_UNSEEN))
     }
 
     fn value(&self, key: &str, problem: impl Into<String>) -> PipelineError {
@@ -82,16 +81,18 @@ impl Pipeline {
         if let Some(path) = self.import_path().filter(|path| !path.is_file()) {
             return Err(self.value("tasks.import", format!("no such file: {}", path.display())));
         }
+        self.check_blocks()?;
         if tasks.import.is_some() {
             return Ok(());
         }
         let (train, unseen) = (tasks.train, self.n_unseen());
-        let (train_limit, unseen_limit) = split_limits(tasks.family);
+        let (train_limit, unseen_limit) = tasks.pool().limits(train);
         if tasks.family == Family::ObjectSorting && train != train_limit {
             let problem = format!("is {train}; object_sorting has {train_limit} training mappings");
             return Err(self.value("tasks.train", problem));
         }
-        let name = tasks.family.name();
+        let blocks = tasks.pool().blocks.map_or_else(String::new, |blocks| format!(" with {blocks} blocks"));
+        let name = format!("{}{blocks}", tasks.family.name());
         if train > train_limit {
             let problem = format!("is {train}; {name} has at most {train_limit} training tasks");
             return Err(self.value("tasks.train", problem));
@@ -100,6 +101,20 @@ impl Pipeline {
             return Err(self.value("tasks.unseen", format!("is {unseen}; {name} has at most {unseen_limit} others")));
         }
         Ok(())
+    }
+
+    fn check_blocks(&self) -> Result<(), PipelineError> {
+        let tasks = &self.spec.tasks;
+        let Some(blocks) = tasks.blocks else { return Ok(()) };
+        let problem = match tasks.family.max_blocks() {
+            None => format!("{} has no blocks to leave out; leave the key out", tasks.family.name()),
+            Some(most) if !(2..=most).contains(&blocks) => format!("is {blocks}; allowed is 2 to {most}"),
+            Some(_) if tasks.import.is_some() => {
+                "an imported file says itself what its tasks need; leave it out".into()
+            }
+            Some(_) => return Ok(()),
+        };
+        Err(self.value("tasks.blocks", problem))
     }
 
     fn check_generate(&self) -> Result<(), PipelineError> {
@@ -143,6 +158,9 @@ impl Pipeline {
     fn check_models(&self) -> Result<(), PipelineError> {
         let mut names = Vec::new();
         for (idx, model) in self.spec.models.iter().enumerate() {
+            if let Some(tag) = &model.tag {
+                check_name(&self.path, &format!("models[{idx}].tag"), tag)?;
+            }
             if model.seeds.is_empty() {
                 return Err(self.value(&format!("models[{idx}].seeds"), "is empty; at least one is needed"));
             }
@@ -172,9 +190,6 @@ impl Pipeline {
     fn blindness(&self) -> Option<&'static str> {
         match self.spec.generate.cameras.first() {
             None => Some("it sees with the first of generate.cameras, and there is none"),
-            Some(camera) if camera.format != PictureFormat::Png => {
-                Some("the first of generate.cameras must have format png")
-            }
             Some(camera) if camera.size_px[0] != camera.size_px[1] => {
                 Some("the first of generate.cameras must be as wide as high")
             }

@@ -7,18 +7,20 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde_json::json;
 
 use crate::artifact::{FileEntry, Plan, Receipt};
-use crate::model::{Decoder, ModelConfig, Variant, check_purpose};
+use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, tasks};
+use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, detections, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
-use crate::rollout::{self, Acted, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy};
+use crate::rollout::{
+    self, Acted, DetectionRows, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy,
+};
 use crate::seed::Seed;
 use crate::sim::Simulation;
 use crate::task::{Split, Task, TaskSet};
@@ -26,6 +28,9 @@ use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
+/// How the paths of a shard's tables begin.
+const PART: &str = "parts/part-";
+const DETECTIONS_PART: &str = "parts/detections-";
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
@@ -43,14 +48,18 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
             if actor.is_some_and(|actor| !spec.models[actor.model].acts(&suite_spec.name)) {
                 continue;
             }
-            let config = json!({
+            let mut config = json!({
                 "seed": spec.seed,
                 "suite": suite_spec,
                 "decoder": actor.map(|actor| actor.decoder),
                 "record": spec.rollout.record,
+                "cameras": spec.generate.cameras,
                 "decisions_factor": spec.rollout.decisions_factor,
                 "simulation": spec.generate.simulation,
             });
+            if let Some(tasks) = trained_on(context, actor, suite_spec) {
+                config["trained_on"] = json!(tasks);
+            }
             let shards = suite_spec.episodes.div_ceil(EPISODES_PER_SHARD);
             units.push(Unit {
                 name: format!("rollout {name} {}", suite_spec.name),
@@ -94,6 +103,13 @@ fn model_inputs(
     Ok(inputs)
 }
 
+/// How many of a suite's tasks an actor may be asked for: of the seen ones those that its model was trained on. `None`
+/// for all.
+fn trained_on(context: &Context<'_>, actor: Option<ModelActor>, suite: &SuiteSpec) -> Option<usize> {
+    let train_tasks = context.pipeline.spec.models[actor?.model].train_tasks?;
+    (suite.split == Split::Seen).then_some(train_tasks as usize)
+}
+
 /// What a unit's shards share.
 struct Suite<'a> {
     context: &'a Context<'a>,
@@ -108,7 +124,8 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let (task_set, _) = tasks::read(context)?;
     let spec = &context.pipeline.spec.rollout.suites[suite];
     let learned = actor.map(|actor| learned(context, actor, &task_set));
-    let suite = Suite { context, unit, spec, tasks: suite_tasks(context, &task_set, spec)?, learned };
+    let tasks = suite_tasks(context, &task_set, spec, trained_on(context, actor, spec))?;
+    let suite = Suite { context, unit, spec, tasks, learned };
     unit.dir.begin(&unit.plan)?;
     let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
     let shards = context.shards(unit)?;
@@ -126,6 +143,8 @@ struct Learned {
     variant: Variant,
     specification: SpecificationForm,
     decoder: Decoder,
+    /// Whether the decoder is the model's first.
+    is_first: bool,
     acted: Acted,
 }
 
@@ -141,18 +160,23 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
     };
     let name = model_name(spec, seed);
     let folder = context.dir.model(&name).path().to_owned();
-    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, acted }
+    let is_first = spec.decoders.first() == Some(&decoder);
+    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, is_first, acted }
 }
 
 impl Learned {
-    /// Refuses a model that was made for another family, another number of slots, or as another variant.
+    /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
+    /// another variant.
     fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
-        let (found, policy) = load_policy(&self.folder, self.decoder)?;
+        let found = load_config(&self.folder)?;
         let family = context.pipeline.spec.tasks.family;
-        let wanted =
+        let mut wanted =
             ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
+        if let Some(camera) = context.pipeline.spec.generate.cameras.first() {
+            wanted.network = wanted.network.seeing(camera.size_px[0] as usize, wanted.n_slots);
+        }
         check_purpose(&found, &wanted, &self.folder)?;
-        Ok(policy)
+        Ok(load_policy(&self.folder, self.decoder)?.1)
     }
 }
 
@@ -162,12 +186,22 @@ fn demonstrations<'a>(context: &Context<'a>, suite: &'a SuiteSpec) -> Demonstrat
     Demonstrations { seed: spec.seed, suite, simulation: &spec.generate.simulation, frames: RecordedFrames::Boundaries }
 }
 
-/// The tasks that a suite asks for, in its order of sub-tasks.
-fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> Result<Vec<Task>, PipelineError> {
+/// The tasks that a suite asks for, in its order of sub-tasks; of the first `most` of its split.
+fn suite_tasks(
+    context: &Context<'_>,
+    task_set: &TaskSet,
+    spec: &SuiteSpec,
+    most: Option<usize>,
+) -> Result<Vec<Task>, PipelineError> {
     let demonstrations = demonstrations(context, spec);
     let ordered = |task: &Task| demonstrations.ordered(task);
     let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
-    let tasks: Vec<Task> = task_set.of_split(spec.split).filter(is_asked_for).filter_map(ordered).collect();
+    let tasks: Vec<Task> = task_set
+        .of_split(spec.split)
+        .take(most.unwrap_or(usize::MAX))
+        .filter(is_asked_for)
+        .filter_map(ordered)
+        .collect();
     if tasks.is_empty() {
         let (field, problem) = match (spec.order, spec.bowls) {
             (OrderSpec::Shuffled, _) => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),
@@ -186,16 +220,26 @@ fn suite_tasks(context: &Context<'_>, task_set: &TaskSet, spec: &SuiteSpec) -> R
 /// Puts the shards' rows into one table and commits.
 fn finish(unit: &Unit, progress: &Progress) -> Result<(), PipelineError> {
     let mut rows = RolloutRows::default();
+    let mut detections: Option<DetectionRows> = None;
     for shard in 0..unit.plan.shards {
         if let Some(receipt) = unit.dir.receipt(&unit.plan, shard)? {
-            let part = receipt.files.iter().find(|file| file.path.ends_with(".parquet"));
-            if let Some(part) = part {
-                rows.append(RolloutRows::read(&unit.dir.path().join(&part.path))?);
+            for file in &receipt.files {
+                let path = unit.dir.path().join(&file.path);
+                if file.path.starts_with(PART) {
+                    rows.append(RolloutRows::read(&path)?);
+                } else if file.path.starts_with(DETECTIONS_PART) {
+                    detections.get_or_insert_default().append(DetectionRows::read(&path)?);
+                }
             }
         }
     }
     rows.write(&unit.dir.path().join(TABLE))?;
-    let manifest = unit.dir.commit(&unit.plan, &[TABLE])?;
+    let mut tables = vec![TABLE];
+    if let Some(detections) = detections {
+        detections.write(&unit.dir.path().join(detections::TABLE))?;
+        tables.push(detections::TABLE);
+    }
+    let manifest = unit.dir.commit(&unit.plan, &tables)?;
     let succeeded = manifest.episodes - manifest.failed;
     progress.finish(&format!("{succeeded} of {} succeeded", manifest.episodes));
     Ok(())
@@ -212,11 +256,19 @@ impl Suite<'_> {
         }
         context.go_on()?;
         let starts: Result<Vec<Start<'_>>, PipelineError> = range.clone().map(|episode| self.start(episode)).collect();
-        let acted = self.act(starts?)?;
-        let part = format!("parts/part-{shard:05}.parquet");
+        let starts = starts?;
+        let mut policy = self.policy(&starts)?;
         let by = self.learned.as_ref().map(|learned| learned.acted.clone()).unwrap_or_default();
+        let detections = self.detections(policy.as_ref(), &by, &starts);
+        let acted = self.act(policy.as_mut(), starts)?;
+        let part = format!("{PART}{shard:05}.parquet");
         RolloutRows::of(&spec.name, &by, &acted).write(&unit.dir.path().join(&part))?;
         let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
+        if let Some(detections) = detections {
+            let part = format!("{DETECTIONS_PART}{shard:05}.parquet");
+            detections.write(&unit.dir.path().join(&part))?;
+            files.push(FileEntry::of(unit.dir.path(), &part)?);
+        }
         files.extend(self.record(shard, &acted)?);
         unit.dir.commit_shard(&Receipt {
             plan_id: unit.plan.id(),
@@ -254,7 +306,16 @@ impl Suite<'_> {
     fn sight(&self, demonstration: &Episode, world: &Simulation, seed: Seed) -> Result<Option<Sight>, PipelineError> {
         let sees = self.learned.as_ref().is_some_and(|learned| learned.variant.sees());
         let camera = self.context.pipeline.spec.generate.cameras.first().filter(|_| sees);
-        camera.map(|camera| sight(camera, demonstration, world.scene(), seed)).transpose()
+        let look = |camera| {
+            sight(camera, demonstration, world.scene(), seed).map_err(|source| PipelineError::Sight {
+                suite: self.spec.name.clone(),
+                episode: demonstration.provenance.index,
+                task_id: demonstration.provenance.task_id.clone(),
+                camera: camera.name.clone(),
+                source: Box::new(source),
+            })
+        };
+        camera.map(look).transpose()
     }
 
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
@@ -267,14 +328,24 @@ impl Suite<'_> {
         })
     }
 
-    fn act(&self, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
-        let mut policy: Box<dyn Policy> = match &self.learned {
+    fn policy(&self, starts: &[Start<'_>]) -> Result<Box<dyn Policy>, PipelineError> {
+        Ok(match &self.learned {
             Some(learned) => learned.policy(self.context)?,
-            None => Box::new(Oracle::for_starts(&starts)),
-        };
+            None => Box::new(Oracle::for_starts(starts)),
+        })
+    }
+
+    /// The errors of a detector, which are the same whatever decodes what is behind it.
+    fn detections(&self, policy: &dyn Policy, by: &Acted, starts: &[Start<'_>]) -> Option<DetectionRows> {
+        self.learned.as_ref().filter(|learned| learned.variant.detects() && learned.is_first)?;
+        let camera = self.context.pipeline.spec.generate.cameras.first()?;
+        detections::of_starts(policy, &self.spec.name, by, camera, starts)
+    }
+
+    fn act(&self, policy: &mut dyn Policy, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
         let factor = self.context.pipeline.spec.rollout.decisions_factor;
         let limits = Limits { decisions_factor: factor, ..Limits::default() };
-        rollout::run(policy.as_mut(), starts, limits).map_err(|source| PipelineError::Trace {
+        rollout::run(policy, starts, limits).map_err(|source| PipelineError::Trace {
             task_id: self.unit.name.clone(),
             trial: 0,
             source,
@@ -289,7 +360,8 @@ impl Suite<'_> {
         }
         let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", self.unit.plan.shards);
         let plan_json = serde_json::to_string(&self.unit.plan).unwrap_or_default();
-        let mut writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
+        let writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
+        let mut writer = writer.with_cameras(&self.context.pipeline.spec.generate.cameras);
         for rollout in acted.iter().take(n_recorded as usize) {
             writer.write(&rollout.episode)?;
         }

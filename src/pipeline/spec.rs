@@ -7,7 +7,7 @@ use crate::dataset::ConvertConfig;
 use crate::model::{Decoder, Variant};
 use crate::render::CameraConfig;
 use crate::sim::{AdversaryConfig, SimulationConfig};
-use crate::task::{Family, Split};
+use crate::task::{Family, Split, TaskPool};
 use crate::trace::SpecificationForm;
 use crate::training::{TrainConfig, Training};
 
@@ -50,9 +50,20 @@ pub struct TasksSpec {
     /// How many are held out. Left out with `import`: all the others.
     #[serde(default)]
     pub unseen: Option<u32>,
+    /// Block Stacking: only the first so many blocks, 2 to 8, are within reach; the others stand aside. 8 when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<u16>,
     /// A task file of the authors' format in place of drawn tasks, relative to the pipeline file.
     #[serde(default)]
     pub import: Option<String>,
+}
+
+impl TasksSpec {
+    /// What tasks are drawn from.
+    pub(super) fn pool(&self) -> TaskPool {
+        let blocks = self.blocks.filter(|&blocks| Some(blocks) != self.family.max_blocks());
+        TaskPool { family: self.family, blocks }
+    }
 }
 
 /// Which frames a recording holds.
@@ -114,6 +125,10 @@ impl Default for GenerateSpec {
 pub struct ModelSpec {
     /// Which model.
     pub variant: Variant,
+    /// What tells it apart from other models of its variant that are trained otherwise: letters, digits, `_` and `-`.
+    /// The report shows it beside the variant's name, and leaves tagged models out of the paper's figures and claims.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag: Option<String>,
     /// One training run for each.
     #[serde(default = "one_seed")]
     pub seeds: Vec<u64>,
@@ -187,7 +202,7 @@ impl Default for RolloutSpec {
 pub struct SuiteSpec {
     /// Names its folder: letters, digits, `_` and `-`.
     pub name: String,
-    /// Which tasks.
+    /// Which tasks; of the seen ones those that the acting model was trained on.
     pub split: Split,
     /// How many episodes; tasks are taken in turn.
     pub episodes: u32,

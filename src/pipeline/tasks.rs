@@ -41,7 +41,7 @@ fn make(context: &Context<'_>) -> Result<TaskSet, PipelineError> {
     let spec = &context.pipeline.spec;
     let Some(path) = context.pipeline.import_path() else {
         let seed = Seed(spec.seed).derive("tasks", &[]);
-        return Ok(task::sample(spec.tasks.family, spec.tasks.train, context.pipeline.n_unseen(), seed)?);
+        return Ok(task::sample(spec.tasks.pool(), spec.tasks.train, context.pipeline.n_unseen(), seed)?);
     };
     let mut tasks = task::import(&path, spec.tasks.train)?;
     if tasks.family != spec.tasks.family {

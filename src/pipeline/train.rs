@@ -11,10 +11,13 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, Part, Unit};
 use crate::pipeline::{ModelSpec, PipelineError, Stage, gallery, tasks};
 use crate::task::Split;
-use crate::training::{self, Gallery, Hooks, METRICS_FILE};
+use crate::training::{self, DETECTOR_METRICS_FILE, Gallery, Hooks, METRICS_FILE};
 
 /// What a finished training leaves; checkpoints are not part of it.
-const RESULT_FILES: [&str; 3] = [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE];
+fn result_files(spec: &ModelSpec) -> impl Iterator<Item = &'static str> {
+    let of_detector = spec.variant.detects().then_some(DETECTOR_METRICS_FILE);
+    [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE].into_iter().chain(of_detector)
+}
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let version = context.dir.dataset().version()?;
@@ -45,9 +48,10 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     let Part::Model { model, seed } = unit.part else { return Ok(()) };
     let spec = &context.pipeline.spec.models[model];
     let trials = training_trials(context, spec)?;
+    let gallery = spec.variant.sees().then(|| gallery::open(context, &trials)).transpose()?;
     unit.dir.begin(&unit.plan)?;
     let training = spec.training(seed).resolved();
-    let progress = context.progress(unit, u64::from(training.config.n_steps()), "steps");
+    let progress = context.progress(unit, u64::from(training.config.n_steps_in_all()), "steps");
     let mut shown = 0;
     let mut on_progress = |now: training::Progress| {
         progress.inc(u64::from(now.step - shown));
@@ -55,13 +59,12 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         progress.message(&format!("loss {:.3}", now.loss));
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
-    let gallery = spec.variant.sees().then(|| gallery::read(context, &trials)).transpose()?;
     let gallery = gallery.as_ref().map(|gallery| gallery as &dyn Gallery);
     let summary = training::train_seeing(&training, &trials, gallery, unit.dir.path(), &mut hooks);
     context.go_on()?;
     let summary = summary?;
     let files: Result<Vec<FileEntry>, IoError> =
-        RESULT_FILES.iter().map(|file| FileEntry::of(unit.dir.path(), file)).collect();
+        result_files(spec).map(|file| FileEntry::of(unit.dir.path(), file)).collect();
     unit.dir.commit_shard(&Receipt {
         plan_id: unit.plan.id(),
         shard: 0,

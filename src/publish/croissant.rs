@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use crate::artifact::FileEntry;
 use crate::publish::tables::{ColumnFacts, TableFacts};
 use crate::publish::{Facts, Publication};
-use crate::table::{Form, Value as CellValue};
+use crate::table::{ColumnKind, Form, Value as CellValue};
 
 const CONTEXT: &str = include_str!("croissant_context.json");
 const PARQUET: &str = "application/x-parquet";
@@ -102,7 +102,7 @@ fn field(table: &TableFacts, column: &ColumnFacts) -> Option<Value> {
     let data_type = match kind.value {
         CellValue::Int64 => "cr:Int64",
         CellValue::Float32 => "cr:Float32",
-        CellValue::Float64 => "cr:Float64",
+        CellValue::Float64 | CellValue::Channels => "cr:Float64",
         CellValue::Boolean => "sc:Boolean",
         CellValue::Text => "sc:Text",
         CellValue::Picture => "sc:ImageObject",
@@ -119,9 +119,14 @@ fn field(table: &TableFacts, column: &ColumnFacts) -> Option<Value> {
         "extract": { "column": column.name },
     });
     field.insert("source".to_owned(), source);
-    if kind.form == Form::List {
+    let shape = match kind {
+        ColumnKind { form: Form::List, .. } => Some("-1"),
+        ColumnKind { value: CellValue::Channels, .. } => Some("3,1,1"),
+        _ => None,
+    };
+    if let Some(shape) = shape {
         field.insert("isArray".to_owned(), json!(true));
-        field.insert("arrayShape".to_owned(), json!("-1"));
+        field.insert("arrayShape".to_owned(), json!(shape));
     }
     Some(Value::Object(field))
 }

@@ -49,6 +49,16 @@ impl Tables {
         self.add("rollouts", path.to_owned(), None);
     }
 
+    /// Adds a `detections.parquet`.
+    pub fn add_detections(&mut self, path: &Path) {
+        self.add("detections", path.to_owned(), None);
+    }
+
+    /// Adds the `detector_metrics.parquet` of a model.
+    pub fn add_detector_metrics(&mut self, path: &Path, model: &str) {
+        self.add("detector_metrics", path.to_owned(), Some(model.to_owned()));
+    }
+
     /// Adds the `metrics.parquet` of a model.
     pub fn add_metrics(&mut self, path: &Path, model: &str) {
         self.add("metrics", path.to_owned(), Some(model.to_owned()));

@@ -8,10 +8,10 @@ use super::observation::Observed;
 use super::schema::{CameraTopic, Topic, proto};
 use super::start::{self, Start};
 use super::transform::{self, GRIPPER};
-use super::{calls, observation};
+use super::{calls, observation, pushes};
 use crate::geometry::Pose;
 use crate::scene::SceneState;
-use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall, RecordedFrames};
+use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall, Push, RecordedFrames};
 
 /// Which frames an episode is put together from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,6 +60,7 @@ struct Building {
     /// Positions of the boundary frames among all.
     boundaries: Vec<u32>,
     calls: Vec<ProgramCall>,
+    pushes: Vec<Push>,
     pictures: PicturesBeingRead,
 }
 
@@ -137,6 +138,11 @@ impl Assembler {
                 let outcome = decode_outcome(&end)?;
                 return self.building.take().map(|building| building.assembled(outcome)).transpose();
             }
+            Topic::Push => {
+                let push = proto::Push::decode(data)?;
+                building.check_time(log_time_nanos, push.frames.map_or(0, |frames| frames.begin))?;
+                building.pushes.push(pushes::decode(push)?);
+            }
             Topic::EpisodeStart | Topic::Stack | Topic::Scene | Topic::Event | Topic::Log => {}
         }
         Ok(None)
@@ -167,6 +173,7 @@ impl Building {
             times_nanos: Vec::new(),
             boundaries: Vec::new(),
             calls: Vec::new(),
+            pushes: Vec::new(),
             pictures: PicturesBeingRead::default(),
         })
     }
@@ -236,6 +243,7 @@ impl Building {
         expect("number of frames", self.times_nanos.len() as u64, u64::from(message.frames))?;
         expect("number of boundary frames", self.boundaries.len() as u64, u64::from(message.boundary_frames))?;
         expect("number of calls", self.calls.len() as u64, u64::from(message.calls))?;
+        expect("number of pushes", self.pushes.len() as u64, u64::from(message.pushes))?;
         if self.transforms_at_nanos.is_some() {
             return Err(MessageProblem::OutOfPlace("the transforms before have no observation"));
         }
@@ -246,7 +254,7 @@ impl Building {
     }
 
     fn assembled(self, outcome: Outcome) -> Result<Assembled, MessageProblem> {
-        let Self { start, frames, times_nanos, boundaries, calls, pictures, .. } = self;
+        let Self { start, frames, times_nanos, boundaries, calls, pushes, pictures, .. } = self;
         let cameras = pictures.finish(times_nanos.len())?;
         let Start { provenance, scene, specification_frames } = start;
         let recorded = RecordedFrames {
@@ -254,7 +262,7 @@ impl Building {
             count: times_nanos.len() as u32,
             end_nanos: times_nanos.last().copied().unwrap_or(0),
         };
-        let parts = EpisodeParts { provenance, scene, frames, specification_frames, calls, outcome };
+        let parts = EpisodeParts { provenance, scene, frames, specification_frames, calls, pushes, outcome };
         Ok(Assembled { parts, recorded, cameras })
     }
 }

@@ -91,7 +91,7 @@ pub(super) fn decode_call(message: &mut proto::ProgramCall) -> Result<ProgramCal
     })
 }
 
-fn decode_span(&proto::Span { begin, end }: &proto::Span) -> Result<Span, MessageProblem> {
+pub(super) fn decode_span(&proto::Span { begin, end }: &proto::Span) -> Result<Span, MessageProblem> {
     Span::new(begin, end).ok_or(MessageProblem::EmptySpan { begin, end })
 }
 

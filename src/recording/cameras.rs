@@ -12,7 +12,7 @@ use super::schema::foxglove::{
 use super::schema::{CameraTopic, Timestamp, timestamp};
 use super::transform::{GRIPPER, WORLD};
 use crate::render::{CameraConfig, Mount, PictureFormat};
-use crate::trace::Episode;
+use crate::trace::{Actor, Episode};
 use crate::video::{Film, VideoError};
 
 /// What one camera saw of an episode.
@@ -85,6 +85,10 @@ fn filmed(film: &mut Film, episode: &Episode) -> Result<Filmed, VideoError> {
         Ok(picture.to_vec())
     });
     let pictures = pictures.collect::<Result<_, VideoError>>()?;
+    // The expert always handles something. A policy may end before it has moved.
+    if episode.provenance.actor == Actor::Expert {
+        film.check_sight()?;
+    }
     let camera = film.camera();
     let matrix = camera.matrix();
     let [a, b, c, d, e, f, g, h, i] = matrix;

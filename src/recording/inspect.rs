@@ -105,7 +105,8 @@ pub fn inspect(path: &Path) -> Result<RecordingInspection, RecordingError> {
 }
 
 fn count_end(found: &mut RecordingInspection, end: proto::EpisodeEnd) {
-    let proto::EpisodeEnd { index: _, success, cause, frames, boundary_frames, calls } = end;
+    // Pushes are counted by their topic.
+    let proto::EpisodeEnd { index: _, success, cause, frames, boundary_frames, calls, pushes: _ } = end;
     let outcome = if success { "success".to_owned() } else { cause };
     *found.outcomes.entry(outcome).or_default() += 1;
     found.episodes += 1;

@@ -195,7 +195,7 @@ impl Salvage {
             let names = (declared.topic.as_str(), declared.schema.as_str(), declared.encoding.as_str());
             names == (topic.name(), topic.message(), "protobuf")
         };
-        let Some(topic) = Topic::READ.into_iter().find(is_topic) else { return Ok(()) };
+        let Some(topic) = Topic::read().find(is_topic) else { return Ok(()) };
         let assembled = self.assembler.message(topic, log_time_nanos, data).map_err(|problem| {
             let (path, topic, episode) = (self.path.clone(), topic.name(), self.n_kept);
             RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem }

@@ -32,6 +32,7 @@ pub(super) enum Topic {
     Scene,
     Event,
     Log,
+    Push,
 }
 
 /// The descriptor set of a message type.
@@ -43,7 +44,7 @@ macro_rules! descriptor {
 
 impl Topic {
     /// Every topic, in the order of their channels.
-    pub(super) const ALL: [Self; 10] = [
+    pub(super) const ALL: [Self; 11] = [
         Self::EpisodeStart,
         Self::EpisodeEnd,
         Self::Transforms,
@@ -54,9 +55,15 @@ impl Topic {
         Self::Scene,
         Self::Event,
         Self::Log,
+        Self::Push,
     ];
 
-    /// Those that a reader cannot do without; the others are for viewers.
+    /// Those that a reader reads; the others are for viewers.
+    pub(super) fn read() -> impl Iterator<Item = Self> {
+        Self::READ.into_iter().chain([Self::Push])
+    }
+
+    /// Those that a reader cannot do without. Recordings from before there were pushes have none of them.
     pub(super) const READ: [Self; 6] =
         [Self::EpisodeStart, Self::EpisodeEnd, Self::Transforms, Self::Observation, Self::Call, Self::Return];
 
@@ -73,6 +80,7 @@ impl Topic {
             Self::Scene => "/scene",
             Self::Event => "/ntp/event",
             Self::Log => "/log",
+            Self::Push => "/ntp/push",
         }
     }
 
@@ -89,6 +97,7 @@ impl Topic {
             Self::Scene => "foxglove.SceneUpdate",
             Self::Event => "foxglove.Event",
             Self::Log => "foxglove.Log",
+            Self::Push => "ntp.v1.Push",
         }
     }
 
@@ -105,6 +114,7 @@ impl Topic {
             Self::Scene => descriptor!("foxglove.SceneUpdate"),
             Self::Event => descriptor!("foxglove.Event"),
             Self::Log => descriptor!("foxglove.Log"),
+            Self::Push => descriptor!("ntp.v1.Push"),
         }
     }
 }

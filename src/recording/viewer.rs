@@ -9,7 +9,7 @@ use super::schema::{Timestamp, program_to_proto, proto, timestamp};
 use super::transform::{GRIPPER, WORLD};
 use crate::program::Program;
 use crate::scene::{Body, Prism, Scene, Shape};
-use crate::trace::{Episode, ProgramCall, Provenance};
+use crate::trace::{Episode, ProgramCall, Provenance, Push};
 
 const TABLE_COLOR: [u8; 3] = [205, 196, 180];
 const TABLE_THICKNESS_M: f32 = 0.02;
@@ -156,6 +156,11 @@ pub(super) fn start_log(log_time_nanos: u64, episode: &Episode) -> Log {
 pub(super) fn end_log(log_time_nanos: u64, episode: &Episode) -> Log {
     let level = if episode.outcome.is_success() { log::Level::Info } else { log::Level::Warning };
     text_log(log_time_nanos, level, format!("episode {}: {}", episode.provenance.index, episode.outcome))
+}
+
+/// That an adversary pushes.
+pub(super) fn push_log(log_time_nanos: u64, scene: &Scene, push: &Push) -> Log {
+    text_log(log_time_nanos, log::Level::Warning, push.in_words(scene))
 }
 
 fn text_log(log_time_nanos: u64, level: log::Level, message: String) -> Log {

@@ -22,7 +22,7 @@ use super::cameras::{Cameras, Filmed};
 use super::container::{MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{EpisodeProblem, RecordingError};
 use super::schema::{CameraTopic, SCHEMA_VERSION, Topic, proto};
-use super::{observation, start, transform, viewer};
+use super::{observation, pushes, start, transform, viewer};
 use crate::artifact::{AtomicFile, IoError};
 use crate::geometry::Pose;
 use crate::program::{Program, vocabulary_hash};
@@ -259,6 +259,11 @@ impl Sink {
             if changed {
                 self.put(Topic::Stack, start_nanos + frame.time_nanos, &viewer::stack(&running))?;
             }
+            for push in episode.pushes.iter().filter(|push| push.frames.begin as usize == position) {
+                let log_time_nanos = start_nanos + frame.time_nanos;
+                self.put(Topic::Push, log_time_nanos, &pushes::encode(push))?;
+                self.put(Topic::Log, log_time_nanos, &viewer::push_log(log_time_nanos, &episode.scene, push))?;
+            }
         }
         self.put(Topic::Log, times.end_nanos, &viewer::end_log(times.end_nanos, episode))?;
         self.put(Topic::EpisodeEnd, times.end_nanos, &encode_end(episode))
@@ -403,5 +408,6 @@ fn encode_end(episode: &Episode) -> proto::EpisodeEnd {
         frames: episode.frames.len() as u32,
         boundary_frames: episode.boundary_frames().count() as u32,
         calls: episode.calls.len() as u32,
+        pushes: episode.pushes.len() as u32,
     }
 }

@@ -26,6 +26,17 @@ pub enum Shadows {
     Soft,
 }
 
+/// The letters on blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Letters {
+    /// None.
+    None,
+    /// In the middle of a face, which keeps its colour.
+    Small,
+    /// As large as a face: to tell blocks apart by letters alone, also in small pictures.
+    Large,
+}
+
 /// The settings of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
@@ -36,8 +47,8 @@ pub struct Look {
     /// Samples across and down a pixel, 1 to 4: more make edges smoother. Colours are their mean; depth and segment are
     /// those of the nearest.
     pub samples: u32,
-    /// Whether blocks bear their letters.
-    pub letters: bool,
+    /// The letters on blocks.
+    pub letters: Letters,
     /// How high an arm stands above the gripper's hand, in metres.
     pub stem_m: f32,
     /// The colour of each body; where there is none, the scene's.
@@ -60,7 +71,7 @@ impl Look {
             },
             shadows: Shadows::Sharp,
             samples: 1,
-            letters: true,
+            letters: Letters::Small,
             stem_m: 0.05,
             body_colors: Vec::new(),
             table_color: [196, 164, 128],

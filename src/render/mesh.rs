@@ -60,6 +60,9 @@ pub(super) struct Mesh {
     pub(super) faces: Vec<Face>,
     /// No corner is farther from the frame's origin.
     pub(super) radius_m: f32,
+    /// By how many texels of the shadow map its far sides may be misplaced before they shadow their own lit sides: 0
+    /// for what is thicker than texels are wide.
+    pub(super) shadow_slack: f32,
 }
 
 /// A colour with its shine.

@@ -69,6 +69,11 @@ impl Picture {
         [self.rgb[first], self.rgb[first + 1], self.rgb[first + 2]]
     }
 
+    /// Whether any pixel shows a body.
+    pub fn shows_a_body(&self) -> bool {
+        self.segments.iter().any(|&segment| matches!(Segment::from_number(segment), Segment::Body(_)))
+    }
+
     pub(super) fn resize(&mut self, width: u32, height: u32) {
         let n_pixels = width as usize * height as usize;
         (self.width, self.height) = (width, height);

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Rotation, Vec3};
 use crate::render::camera::{Camera, Mount};
-use crate::render::look::Look;
+use crate::render::look::{Letters, Look};
 use crate::scene::{Mobility, Scene};
 use crate::seed::Seed;
 
@@ -15,13 +15,15 @@ use crate::seed::Seed;
 pub struct Randomization {
     /// How far the sun moves and light changes: 0 not at all, 1 half of its strength and most of the sky.
     pub light: f32,
-    /// How far the colours of table, background and bodies change: 0 not at all, 1 by up to half of the range.
+    /// How far the colours of table, background and bodies change: 0 not at all, 1 by up to half of the range. Blocks
+    /// then bear large letters.
     pub color: f32,
     /// How far the camera moves from its place, in metres, in each direction.
     pub camera_m: f32,
     /// How far the camera turns, in radians, about each of its axes.
     pub camera_rad: f32,
-    /// One colour for all that moves, drawn for the episode: only letters and forms tell things apart.
+    /// One colour for all that moves, drawn for the episode: only letters, which are large then, and forms tell things
+    /// apart.
     pub one_color: bool,
 }
 
@@ -55,6 +57,9 @@ impl Randomization {
     pub fn look(&self, usual: &Look, scene: &Scene, seed: Seed) -> Look {
         let mut rng = seed.derive("look", &[]).rng();
         let mut look = usual.clone();
+        if (self.one_color || self.color > 0.0) && usual.letters != Letters::None {
+            look.letters = Letters::Large;
+        }
         let mut signed = |reach: f32| reach * (2.0 * rng.random::<f32>() - 1.0);
         let to_sun = Vec3::new(look.light.to_sun.x + signed(self.light), look.light.to_sun.y + signed(self.light), 0.0);
         let height = (look.light.to_sun.z + signed(0.4 * self.light)).max(MIN_SUN_HEIGHT * to_sun.norm());

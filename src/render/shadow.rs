@@ -99,7 +99,10 @@ impl ShadowMap {
                 + face.offset / away
                 + by_across * (self.corner[0] - origin_across)
                 + by_down * (self.corner[1] - origin_down);
-            let height = Affine { x: by_across / scale, y: by_down / scale, constant };
+            let (x, y) = (by_across / scale, by_down / scale);
+            // Within a texel a slanted side is lower than at its middle; a thin wall's other side lies in between.
+            let constant = constant - mesh.shadow_slack * (x.abs() + y.abs());
+            let height = Affine { x, y, constant };
             self.map.fill(&self.corners, &height, 0);
         }
     }

@@ -4,6 +4,8 @@ use std::sync::OnceLock;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster};
 
+use crate::render::look::Letters;
+
 /// Width and height of the finest level, in texels.
 const SIZE: usize = 256;
 /// Levels, each half as wide as the one before.
@@ -53,18 +55,22 @@ impl Level {
     }
 }
 
-/// The textures that there are, each made when it is first asked for: wood, then the letters from A.
-static TEXTURES: [OnceLock<Texture>; 27] = [const { OnceLock::new() }; 27];
-
 /// Boards of wood.
 pub(super) fn wood() -> &'static Texture {
-    TEXTURES[0].get_or_init(Texture::wood)
+    static WOOD: OnceLock<Texture> = OnceLock::new();
+    WOOD.get_or_init(Texture::wood)
 }
 
-/// A block's face with a capital letter; `None` for other characters.
-pub(super) fn letter(letter: char) -> Option<&'static Texture> {
+/// A block's face with a capital letter; `None` for other characters, and without letters.
+pub(super) fn letter(letter: char, letters: Letters) -> Option<&'static Texture> {
+    static SMALL: [OnceLock<Texture>; 26] = [const { OnceLock::new() }; 26];
+    static LARGE: [OnceLock<Texture>; 26] = [const { OnceLock::new() }; 26];
     let number = letter.is_ascii_uppercase().then(|| letter as usize - 'A' as usize)?;
-    Some(TEXTURES[1 + number].get_or_init(|| Texture::letter(letter)))
+    match letters {
+        Letters::None => None,
+        Letters::Small => Some(SMALL[number].get_or_init(|| Texture::small_letter(letter))),
+        Letters::Large => Some(LARGE[number].get_or_init(|| Texture::large_letter(letter))),
+    }
 }
 
 impl Texture {
@@ -89,13 +95,24 @@ impl Texture {
         &self.levels[(texels.ilog2() as usize).min(LEVELS - 1)]
     }
 
-    /// A block's face: a frame near its edges and a letter in the middle.
-    fn letter(letter: char) -> Self {
-        let glyph = Glyph::new(letter);
+    /// A block's face: a frame near its edges and a letter in the middle, of the font's own proportions.
+    fn small_letter(letter: char) -> Self {
+        let glyph = Glyph::new(letter, 0.0);
+        let [width, height] = glyph.size();
         Self::new(|x, y| {
             let edge = (x - 0.5).abs().max((y - 0.5).abs());
             let frame = 0.3 * (ramp(edge, 0.405, 0.42) - ramp(edge, 0.44, 0.455));
-            glyph.ink((x - 0.5) / LETTER, (y - 0.5) / LETTER).max(frame)
+            glyph.ink((x - 0.5) / SMALL * height / width, (y - 0.5) / SMALL, 0.31).max(frame)
+        })
+    }
+
+    /// A block's face: a line along its edges and a bold letter that fills it, so that letters still differ where a
+    /// face is four or five pixels wide.
+    fn large_letter(letter: char) -> Self {
+        let glyph = Glyph::new(letter, FAINT);
+        Self::new(|x, y| {
+            let edge = (x - 0.5).abs().max((y - 0.5).abs());
+            glyph.ink((x - 0.5) / LARGE, (y - 0.5) / LARGE, 0.26).max(0.3 * ramp(edge, 0.47, 0.48))
         })
     }
 
@@ -128,8 +145,12 @@ fn halved(finer: &[f32], size: usize) -> Vec<f32> {
     (0..size * size).map(mean).collect()
 }
 
-/// Height of a letter over a face's edge.
-const LETTER: f32 = 0.62;
+/// Height of a small letter over a face's edge.
+const SMALL: f32 = 0.62;
+/// Height and width of a large letter over a face's edge.
+const LARGE: f32 = 0.86;
+/// Ink that is no more than a stroke's rim.
+const FAINT: f32 = 0.25;
 
 /// A letter of the bitmap font, cut out of its box.
 struct Glyph {
@@ -137,24 +158,30 @@ struct Glyph {
 }
 
 impl Glyph {
-    fn new(letter: char) -> Self {
+    /// Cut off are rows and columns with nothing but ink up to `faint`; where that is 0, rows alone.
+    fn new(letter: char, faint: f32) -> Self {
         let raster = get_raster(letter, FontWeight::Regular, RasterHeight::Size16);
         let rows: Vec<Vec<f32>> = raster.map_or_else(Vec::new, |raster| {
             raster.rows().map(|row| row.iter().map(|&ink| f32::from(ink) / 255.0).collect()).collect()
         });
-        let inked = |row: &Vec<f32>| row.iter().any(|&ink| ink > 0.0);
-        let rows: Vec<Vec<f32>> = rows.into_iter().skip_while(|row| !inked(row)).collect();
-        let end = rows.iter().rposition(inked).map_or(0, |last| last + 1);
-        Self { rows: rows.into_iter().take(end).collect() }
+        let width = rows.first().map_or(0, Vec::len);
+        let down = extent(rows.len(), |row| rows[row].iter().any(|&ink| ink > faint));
+        let is_inked = |column: usize| faint == 0.0 || rows.iter().any(|row| row[column] > faint);
+        let across = extent(width, is_inked);
+        Self { rows: rows[down].iter().map(|row| row[across.clone()].to_vec()).collect() }
     }
 
-    /// The ink at a place: from -0.5 to 0.5 from top to bottom, as wide as the letter is.
-    fn ink(&self, x: f32, y: f32) -> f32 {
-        let height = self.rows.len() as f32;
-        let width = self.rows.first().map_or(0.0, |row| row.len() as f32);
-        let (column, row) = (x * height + width / 2.0 - 0.5, (y + 0.5) * height - 0.5);
-        // Bolder than the font: a stroke is as wide as its faint rim.
-        ramp(self.between(column, row), 0.31, 0.43)
+    /// Columns and rows.
+    fn size(&self) -> [f32; 2] {
+        [self.rows.first().map_or(0.0, |row| row.len() as f32), self.rows.len() as f32]
+    }
+
+    /// The ink at a place: from -0.5 to 0.5 from left to right and from top to bottom. Bolder than the font, the more
+    /// the lower the threshold: a stroke is as wide as its rim is above it.
+    fn ink(&self, x: f32, y: f32, threshold: f32) -> f32 {
+        let [width, height] = self.size();
+        let (column, row) = ((x + 0.5) * width - 0.5, (y + 0.5) * height - 0.5);
+        ramp(self.between(column, row), threshold, threshold + 0.12)
     }
 
     /// Smoothly between texels: a cubic B-spline, which rounds off the steps of the bitmap.
@@ -175,6 +202,12 @@ impl Glyph {
         let row = usize::try_from(row).ok().and_then(|row| self.rows.get(row));
         row.and_then(|row| row.get(usize::try_from(column).ok()?)).copied().unwrap_or(0.0)
     }
+}
+
+/// From the first position that is inked to the last.
+fn extent(n: usize, is_inked: impl Fn(usize) -> bool) -> std::ops::Range<usize> {
+    let first = (0..n).find(|&at| is_inked(at)).unwrap_or(0);
+    first..(0..n).rfind(|&at| is_inked(at)).map_or(first, |last| last + 1)
 }
 
 /// Weights of the four texels around a place, given by its distance from the second.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::report::PaperValue;
-use crate::report::interval::wilson;
+use crate::report::interval::{student, wilson};
 use crate::report::summary::{Aggregate, SuiteResult};
 
 /// Sums results over training seeds. They stand sorted, so those of one actor and suite are neighbours.
@@ -14,7 +14,9 @@ pub(super) fn aggregates(results: &[SuiteResult], paper: &[PaperValue]) -> Vec<A
 
 fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
     let (actor, suite) = (seeds[0].actor.clone(), seeds[0].suite.clone());
-    let rates = || seeds.iter().map(|seed| seed.success_rate);
+    let rates: Vec<f64> = seeds.iter().map(|seed| seed.success_rate).collect();
+    let of_seeds = student(&rates);
+    let sum = |count: fn(&SuiteResult) -> Option<u64>| seeds.iter().filter_map(count).reduce(|sum, count| sum + count);
     let episodes = seeds.iter().map(|seed| seed.episodes).sum();
     let successes = seeds.iter().map(|seed| seed.successes).sum();
     let (wilson_low, wilson_high) = wilson(successes, episodes);
@@ -24,7 +26,7 @@ fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
     }
     let paper_success_rate = paper
         .iter()
-        .find(|value| actor.is_demonstrated() && value.is_for(&actor.variant, &suite))
+        .find(|value| actor.is_the_papers() && value.is_for(&actor.variant, &suite))
         .map(|value| value.success_rate);
     Aggregate {
         actor,
@@ -32,12 +34,16 @@ fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
         seeds: seeds.len() as u64,
         episodes,
         successes,
-        mean_success_rate: rates().sum::<f64>() / seeds.len() as f64,
-        lowest_success_rate: rates().fold(1.0, f64::min),
-        highest_success_rate: rates().fold(0.0, f64::max),
+        mean_success_rate: rates.iter().sum::<f64>() / rates.len() as f64,
+        lowest_success_rate: rates.iter().copied().fold(1.0, f64::min),
+        highest_success_rate: rates.iter().copied().fold(0.0, f64::max),
+        seeds_low: of_seeds.map(|(low, _)| low),
+        seeds_high: of_seeds.map(|(_, high)| high),
         wilson_low,
         wilson_high,
         causes,
+        pushes: sum(|seed| seed.pushes),
+        toppled: sum(|seed| seed.toppled),
         paper_success_rate,
     }
 }

@@ -14,7 +14,9 @@ use serde::Serialize;
 
 use crate::report::order;
 
-/// How many colours the style sheet has for variants, and as many others for causes and kinds.
+/// How many colours the style sheet has for variants.
+const N_VARIANT_COLORS: usize = 11;
+/// How many others it has for causes and kinds.
 pub(super) const N_COLORS: usize = 8;
 
 /// A mark on an axis.
@@ -75,7 +77,7 @@ impl Panel {
 
 /// The colour of a variant: the same in every report, and for both encoders.
 pub(in crate::report) fn color_of(variant: &str) -> usize {
-    order::variant_rank(variant) % N_COLORS
+    order::variant_rank(variant) % N_VARIANT_COLORS
 }
 
 /// Names as they are in order of appearance, each once.

@@ -8,9 +8,14 @@
 //!
 //! # Source
 //!
-//! Paper, experiments 1 to 3. Variances after A. Agresti and B. Caffo, "Simple and effective confidence intervals for
+//! Paper, experiments 1 to 4. Variances after A. Agresti and B. Caffo, "Simple and effective confidence intervals for
 //! proportions and differences of proportions result from adding two successes and two failures", The American
 //! Statistician 54 (2000).
+
+mod pictures;
+
+pub use pictures::Note;
+pub(super) use pictures::{SIGHTED, notes};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,7 +33,8 @@ pub struct Claim {
     pub id: String,
     /// What the paper says.
     pub claim: String,
-    /// By which encoder of ours it is judged: `object-centric`, or `flattened` as in the paper.
+    /// By which encoder of ours it is judged: `object-centric`, or `flattened` as in the paper; of models that see,
+    /// `colour slots`, `the paper's convolutions` or `general`.
     pub encoder: String,
     /// What came of it.
     pub verdict: Verdict,
@@ -150,14 +156,14 @@ pub(super) fn claims(aggregates: &[Aggregate]) -> Vec<Claim> {
         });
         judged.collect::<Vec<_>>()
     };
-    RULES.iter().flat_map(judge).collect()
+    RULES.iter().flat_map(judge).chain(pictures::claims(aggregates)).collect()
 }
 
 impl<'a> Ours<'a> {
     /// A variant's rows in a suite, by the decoder that stands for it, the most training tasks first.
     fn rows(&self, variant: &str, suite: &str) -> Vec<&'a Aggregate> {
         let name = format!("{variant}{}", self.suffix);
-        let is_own = |row: &&Aggregate| row.actor.variant == name && row.actor.is_demonstrated() && row.suite == suite;
+        let is_own = |row: &&Aggregate| row.actor.variant == name && row.actor.is_the_papers() && row.suite == suite;
         let own = self.aggregates.iter().filter(is_own);
         let mut own: Vec<&Aggregate> = own.collect();
         own.sort_by_cached_key(|row| order::actor(&row.actor));

@@ -20,6 +20,7 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
     let table = df!(
         "experiment" => text(|result| &result.actor.experiment),
         "variant" => text(|result| &result.actor.variant),
+        "tag" => maybe(|result| result.actor.tag.as_deref()),
         "train_tasks" => results.iter().map(|result| result.actor.train_tasks).collect::<Vec<_>>(),
         "specification" => maybe(|result| result.actor.specification.as_deref()),
         "decoder" => maybe(|result| result.actor.decoder.as_deref()),
@@ -45,6 +46,7 @@ pub(super) fn curves(curves: &[Curve]) -> Result<Vec<u8>, ReportError> {
     let table = df!(
         "experiment" => points().map(|(curve, _)| curve.model.experiment.as_str()).collect::<Vec<_>>(),
         "variant" => points().map(|(curve, _)| curve.model.variant.as_str()).collect::<Vec<_>>(),
+        "tag" => points().map(|(curve, _)| curve.model.tag.as_deref()).collect::<Vec<_>>(),
         "train_tasks" => points().map(|(curve, _)| curve.model.train_tasks).collect::<Vec<_>>(),
         "specification" => points().map(|(curve, _)| curve.model.specification.as_str()).collect::<Vec<_>>(),
         "seed" => points().map(|(curve, _)| curve.model.seed).collect::<Vec<_>>(),

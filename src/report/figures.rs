@@ -15,6 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::chart::distinct;
+use crate::report::claims::SIGHTED;
 use crate::report::order;
 use crate::report::summary::Aggregate;
 
@@ -100,16 +101,22 @@ struct Definition {
     source: &'static str,
     /// The quantity of a row; `None` where the row is not in the figure.
     x: fn(&Aggregate) -> Option<i64>,
+    /// With fewer quantities there is nothing to see.
+    least_positions: usize,
     paper: &'static [(&'static str, i64, f64)],
 }
 
-const DEFINITIONS: [Definition; 5] = [
+/// The figure of models that see, which is left out where there are none.
+const PICTURES: &str = "stacking_pictures";
+
+const DEFINITIONS: [Definition; 7] = [
     Definition {
         id: "sorting_length",
         title: "Object Sorting: length",
         x_label: "objects on the table",
         source: "Experiment 1: NTP over 90 % from 4 to 40 objects; flat models from around 40 % to around 25 %",
         x: sorting_length,
+        least_positions: 2,
         paper: &[("ntp", 4, 0.90), ("ntp", 40, 0.90), ("flat", 4, 0.40), ("flat", 40, 0.25)],
     },
     Definition {
@@ -118,7 +125,17 @@ const DEFINITIONS: [Definition; 5] = [
         x_label: "training tasks",
         source: "Experiment 2 and table \u{201c}Adversarial Dynamics\u{201d}, no failure: 0.863 and 0.884 with 1000 tasks",
         x: stacking_unseen,
+        least_positions: 2,
         paper: &[("ntp", 1000, 0.863), ("ntp_gru", 1000, 0.884)],
+    },
+    Definition {
+        id: PICTURES,
+        title: "Block Stacking: from pictures, unseen end configurations",
+        x_label: "training tasks",
+        source: "Experiment 4: full state above end to end above the detector; the text gives no number",
+        x: stacking_pictures,
+        least_positions: 2,
+        paper: &[],
     },
     Definition {
         id: "stacking_seen",
@@ -126,6 +143,7 @@ const DEFINITIONS: [Definition; 5] = [
         x_label: "training tasks",
         source: "Experiment 2: all but Flat around 85 %",
         x: stacking_seen,
+        least_positions: 2,
         paper: &[("ntp", 1000, 0.85), ("ntp_gru", 1000, 0.85), ("ntp_no_scope", 1000, 0.85), ("flat_gru", 1000, 0.85)],
     },
     Definition {
@@ -134,6 +152,7 @@ const DEFINITIONS: [Definition; 5] = [
         x_label: "training tasks",
         source: "Experiment 2, task topology; the text gives no number",
         x: stacking_topology,
+        least_positions: 2,
         paper: &[],
     },
     Definition {
@@ -142,16 +161,39 @@ const DEFINITIONS: [Definition; 5] = [
         x_label: "chance of a push after each placement, %",
         source: "Table \u{201c}Adversarial Dynamics\u{201d}: 0.863 to 0.663, with a GRU 0.884 to 0.422",
         x: adversary,
+        least_positions: 2,
         paper: &[("ntp", 0, 0.863), ("ntp", 25, 0.663), ("ntp_gru", 0, 0.884), ("ntp_gru", 25, 0.422)],
     },
+    Definition {
+        id: "stacking_adversary_force",
+        title: "Block Stacking: force of the adversary",
+        x_label: "impulse of a push at 25 %, mN\u{202f}s",
+        source: "Ours; the paper gives no force",
+        x: force,
+        least_positions: 3,
+        paper: &[],
+    },
 ];
+
+/// Full state, and the models that see.
+fn stacking_pictures(row: &Aggregate) -> Option<i64> {
+    let is_shown = sees(row) || STATES.contains(&row.actor.variant.as_str());
+    row.actor.train_tasks.filter(|_| is_shown && row.suite == "stacking_unseen")
+}
+
+/// What models that see are set beside.
+const STATES: [&str; 2] = ["ntp", "ntp_paper"];
+
+fn sees(row: &Aggregate) -> bool {
+    row.actor.variant.starts_with(SIGHTED)
+}
 
 fn sorting_length(row: &Aggregate) -> Option<i64> {
     row.suite.strip_prefix("sorting_unseen_")?.parse().ok()
 }
 
 fn stacking_unseen(row: &Aggregate) -> Option<i64> {
-    row.actor.train_tasks.filter(|_| row.suite == "stacking_unseen")
+    row.actor.train_tasks.filter(|_| row.suite == "stacking_unseen" && !sees(row))
 }
 
 fn stacking_seen(row: &Aggregate) -> Option<i64> {
@@ -171,10 +213,22 @@ fn adversary(row: &Aggregate) -> Option<i64> {
     }
 }
 
-/// Those figures of the paper that our rollouts have more than one point of.
+/// The default impulse is 60 mN s.
+fn force(row: &Aggregate) -> Option<i64> {
+    match row.suite.as_str() {
+        "stacking_unseen" => Some(0),
+        "stacking_adversary" => Some(60),
+        suite => suite.strip_prefix("stacking_adversary_")?.strip_suffix("_mns")?.parse().ok(),
+    }
+}
+
+/// Those figures that our rollouts have enough points of.
 pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
-    let figures = DEFINITIONS.iter().map(|definition| figure(definition, aggregates));
-    figures.filter(|figure| n_positions(figure) > 1).collect()
+    let figures = DEFINITIONS.iter().map(|definition| (definition, figure(definition, aggregates)));
+    let sees = |series: &Series| series.variant.starts_with(SIGHTED);
+    let figures = figures.filter(|(_, figure)| figure.id != PICTURES || figure.series.iter().any(sees));
+    let shown = figures.filter(|(definition, figure)| n_positions(figure) >= definition.least_positions);
+    shown.map(|(_, figure)| figure).collect()
 }
 
 fn n_positions(figure: &Figure) -> usize {
@@ -187,7 +241,7 @@ fn n_positions(figure: &Figure) -> usize {
 fn figure(definition: &Definition, aggregates: &[Aggregate]) -> Figure {
     let rows: Vec<(i64, &Aggregate)> = aggregates
         .iter()
-        .filter(|row| row.actor.is_demonstrated())
+        .filter(|row| row.actor.is_the_papers())
         .filter_map(|row| Some(((definition.x)(row)?, row)))
         .collect();
     let mut variants = distinct(rows.iter().map(|(_, row)| &row.actor.variant));
@@ -232,7 +286,7 @@ fn series(definition: &Definition, rows: &[(i64, &Aggregate)], variant: String) 
 pub(super) fn grids(aggregates: &[Aggregate]) -> Vec<Grid> {
     let mut cells: Vec<(String, GridCell)> = Vec::new();
     let mut leading: Vec<&Aggregate> =
-        aggregates.iter().filter(|row| row.actor.variant != "oracle" && row.actor.is_demonstrated()).collect();
+        aggregates.iter().filter(|row| row.actor.variant != "oracle" && row.actor.is_the_papers()).collect();
     leading.sort_by_cached_key(|row| order::actor(&row.actor));
     for row in leading {
         let Some((bowls, forks)) = bowls_and_forks(&row.suite) else { continue };

@@ -65,6 +65,12 @@ impl Rows<'_> {
         Ok(column.i64().map_err(ReportError::Query)?.iter().collect())
     }
 
+    /// Numbers, not a number where there is none.
+    pub(super) fn real(&self, name: &str) -> Result<Vec<f64>, ReportError> {
+        let column = self.column(name)?.f64().map_err(ReportError::Query)?;
+        Ok(column.iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+    }
+
     /// Whole numbers, 0 where there is none.
     pub(super) fn whole(&self, name: &str) -> Result<Vec<i64>, ReportError> {
         Ok(self.optional_whole(name)?.into_iter().map(Option::unwrap_or_default).collect())

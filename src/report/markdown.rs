@@ -2,11 +2,15 @@
 
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
-use crate::report::claims::{Claim, Verdict};
-use crate::report::summary::{Aggregate, Report};
+use crate::report::claims::{Claim, Note, Verdict};
+use crate::report::detections::DetectionError;
+use crate::report::summary::{Aggregate, FirstError, Report};
+use crate::report::tables::{self, ModelRow};
 
-/// The columns, and whether numbers stand in them.
-const COLUMNS: [(&str, bool); 9] = [
+/// A column: its name, and whether numbers stand in it.
+type Column = (&'static str, bool);
+
+const COLUMNS: [Column; 11] = [
     ("suite", false),
     ("model", false),
     ("tasks", true),
@@ -14,25 +18,122 @@ const COLUMNS: [(&str, bool); 9] = [
     ("seeds", true),
     ("rollouts", true),
     ("success", true),
-    ("95 %", false),
+    ("95 % over rollouts", false),
+    ("lowest, highest seed", false),
+    ("95 % over seeds", false),
     ("paper", true),
 ];
 
 /// The whole text.
 pub(super) fn render(report: &Report) -> String {
-    let mut text = format!("{}\n", made_by(report));
-    if !report.aggregates.is_empty() {
+    let mut text = format!("**{}**: {}.\n", report.title, made_by(report));
+    let mut put = |columns: &[Column], rows: Vec<Vec<String>>| {
+        if !rows.is_empty() {
+            text.push('\n');
+            text.push_str(&table(columns, rows));
+        }
+    };
+    put(&COLUMNS, report.aggregates.iter().map(row).collect());
+    put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
+    put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
+    put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
+    put(&MODEL_COLUMNS, tables::models(&report.models).iter().map(model).collect());
+    if !report.notes.is_empty() {
         text.push('\n');
-        text.push_str(&table(&COLUMNS, report.aggregates.iter().map(row).collect()));
-    }
-    if !report.claims.is_empty() {
-        text.push('\n');
-        text.push_str(&table(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect()));
+        report.notes.iter().for_each(|said| text.push_str(&note(said)));
     }
     text
 }
 
-const CLAIM_COLUMNS: [(&str, bool); 4] =
+const DETECTION_COLUMNS: [Column; 12] = [
+    ("suite", false),
+    ("model", false),
+    ("tasks", true),
+    ("seeds", true),
+    ("block in sight", false),
+    ("detections", true),
+    ("median cm", true),
+    ("mean absolute x, y, z", true),
+    ("deviation", true),
+    ("95 %, 99 %", true),
+    ("over 2 cm", true),
+    ("paper's deviation", true),
+];
+
+fn detection(error: &DetectionError) -> Vec<String> {
+    let [x, y, z] = error.mean_absolute_cm;
+    vec![
+        error.suite.clone(),
+        error.variant.clone(),
+        error.train_tasks.to_string(),
+        error.seeds.to_string(),
+        error.in_sight.words().to_owned(),
+        error.detections.to_string(),
+        format!("{:.2}", error.median_cm),
+        format!("{x:.2}, {y:.2}, {z:.2}"),
+        format!("{:.2}", error.deviation_cm),
+        format!("{:.2}, {:.2}", error.percentile_95_cm, error.percentile_99_cm),
+        format!("{:.2} %", 100.0 * error.over_2_cm),
+        format!("{:.0}", error.paper_deviation_cm),
+    ]
+}
+
+const FAILURE_COLUMNS: [Column; 7] = [
+    ("suite", false),
+    ("model", false),
+    ("tasks", true),
+    ("decoder", false),
+    ("failed", true),
+    ("as judged", false),
+    ("first error: program and kind", false),
+];
+
+/// Why an actor's rollouts in a suite failed; nothing where none did.
+fn failures(row: &Aggregate, errors: &[FirstError]) -> Option<Vec<String>> {
+    let failed = row.episodes - row.successes;
+    let causes = row.causes.iter().map(|(cause, count)| (*count, cause.clone()));
+    let own = errors.iter().filter(|error| error.actor == row.actor && error.suite == row.suite);
+    let firsts = own.map(|error| {
+        let program = error.program.as_ref().map(|program| format!("{program}: ")).unwrap_or_default();
+        (error.episodes, format!("{program}{}", error.error))
+    });
+    let [suite, model, tasks, decoder] = told_apart(row);
+    let (causes, firsts) = (most_first(causes.collect()), most_first(firsts.collect()));
+    (failed > 0).then(|| vec![suite, model, tasks, decoder, failed.to_string(), causes, firsts])
+}
+
+/// `scope 12, program 3`, the most first.
+fn most_first(mut counts: Vec<(u64, String)>) -> String {
+    counts.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+    let told = counts.iter().map(|(count, name)| format!("{} {count}", name.replace('_', " ")));
+    told.collect::<Vec<_>>().join(", ")
+}
+
+const MODEL_COLUMNS: [Column; 6] = [
+    ("experiment", false),
+    ("model", false),
+    ("tasks", true),
+    ("seeds", true),
+    ("parameters", true),
+    ("CPU-seconds a training", true),
+];
+
+fn model(row: &ModelRow) -> Vec<String> {
+    vec![
+        row.experiment.clone(),
+        row.variant.clone(),
+        row.tasks.clone(),
+        row.seeds.to_string(),
+        row.parameters.clone(),
+        row.cpu_secs.clone().unwrap_or_else(none),
+    ]
+}
+
+fn none() -> String {
+    "-".to_owned()
+}
+
+const CLAIM_COLUMNS: [Column; 4] =
     [("the paper's claim", false), ("encoder", false), ("here", false), ("figures", false)];
 
 fn claim(claim: &Claim) -> Vec<String> {
@@ -43,9 +144,16 @@ fn claim(claim: &Claim) -> Vec<String> {
     vec![claim.claim.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
 }
 
+fn note(note: &Note) -> String {
+    match note.variant.as_str() {
+        "" => format!("- {}\n", note.text),
+        variant => format!("- `{variant}`: {}\n", note.text),
+    }
+}
+
 /// What made the figures: program, commit, seeds, cost.
-fn made_by(report: &Report) -> String {
-    let mut parts = vec![format!("**{}**: ntp {}", report.title, report.ntp_version)];
+pub(super) fn made_by(report: &Report) -> String {
+    let mut parts = vec![format!("ntp {}", report.ntp_version)];
     if !report.commits.is_empty() {
         parts.push(format!("commit {}", report.commits.join(", ")));
     }
@@ -64,26 +172,37 @@ fn made_by(report: &Report) -> String {
     if experiments.len() > 1 {
         parts.push(format!("experiments {}", experiments.join(", ")));
     }
-    format!("{}.", parts.join(", "))
+    parts.join(", ")
 }
 
-fn row(row: &Aggregate) -> Vec<String> {
-    let none = || "-".to_owned();
-    vec![
+/// What tells rows apart: suite, model, training tasks, decoder.
+fn told_apart(row: &Aggregate) -> [String; 4] {
+    [
         row.suite.clone(),
         row.actor.model(),
         row.actor.train_tasks.map_or_else(none, |tasks| tasks.to_string()),
         row.actor.decoder.clone().unwrap_or_else(none),
-        row.seeds.to_string(),
-        row.episodes.to_string(),
-        format!("{:.3}", row.mean_success_rate),
-        format!("[{:.3}, {:.3}]", row.wilson_low, row.wilson_high),
-        row.paper_success_rate.map_or_else(none, |rate| format!("{rate:.3}")),
     ]
 }
 
+fn row(row: &Aggregate) -> Vec<String> {
+    let pair = |low: f64, high: f64| format!("[{low:.3}, {high:.3}]");
+    let range = format!("{:.3}, {:.3}", row.lowest_success_rate, row.highest_success_rate);
+    let of_seeds = row.seeds_low.zip(row.seeds_high);
+    let figures = [
+        row.seeds.to_string(),
+        row.episodes.to_string(),
+        format!("{:.3}", row.mean_success_rate),
+        pair(row.wilson_low, row.wilson_high),
+        if row.seeds > 1 { range } else { none() },
+        of_seeds.map_or_else(none, |(low, high)| pair(low, high)),
+        row.paper_success_rate.map_or_else(none, |rate| format!("{rate:.3}")),
+    ];
+    told_apart(row).into_iter().chain(figures).collect()
+}
+
 /// A table whose columns stand one below the other in plain text too.
-fn table(columns: &[(&str, bool)], rows: Vec<Vec<String>>) -> String {
+fn table(columns: &[Column], rows: Vec<Vec<String>>) -> String {
     let width = |at: usize| {
         let cells = rows.iter().map(|row| row[at].chars().count());
         cells.chain([columns[at].0.chars().count(), 3]).max().unwrap_or(3)

@@ -62,6 +62,7 @@ pub(super) fn read(inputs: &[MetricsInput]) -> Result<Vec<Curve>, ReportError> {
         let model = &curve.model;
         (
             order::variant(&model.variant),
+            model.tag.clone(),
             model.train_tasks,
             model.specification.clone(),
             model.seed,
@@ -131,6 +132,7 @@ pub(super) fn ends(curves: &[Curve]) -> Vec<TrainingEnd> {
         Some(TrainingEnd {
             experiment: curve.model.experiment.clone(),
             variant: curve.model.variant.clone(),
+            tag: curve.model.tag.clone(),
             train_tasks: curve.model.train_tasks,
             specification: curve.model.specification.clone(),
             seed: curve.model.seed,

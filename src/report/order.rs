@@ -8,7 +8,18 @@ use crate::task::Family;
 use crate::trace::SpecificationForm;
 
 /// Variants from the paper's model to its ancestor; the oracle stands last.
-const VARIANTS: [&str; 7] = ["ntp", "ntp_gru", "ntp_no_scope", "flat", "flat_gru", "npi", "oracle"];
+const VARIANTS: [&str; 10] = [
+    "ntp",
+    "ntp_gru",
+    "ntp_no_scope",
+    "flat",
+    "flat_gru",
+    "npi",
+    "ntp_vid_e2e",
+    "ntp_vid_e2e_general",
+    "ntp_vid_detector",
+    "oracle",
+];
 
 /// Decoders, the one that stands for its model where only one can be shown first.
 pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];
@@ -56,13 +67,13 @@ pub(super) fn variant(name: &str) -> (usize, Vec<Word>) {
     (variant_rank(name), natural(name))
 }
 
-/// By variant, then by how much it was trained on, the most first, then by decoder; experiments stand together.
+/// By variant, the untagged first, then by how much it was trained on, the most first, then by decoder; experiments stand together.
 pub(super) fn actor(actor: &Actor) -> impl Ord + use<> {
-    let Actor { experiment, variant: name, train_tasks, specification, decoder } = actor.clone();
+    let Actor { experiment, variant: name, tag, train_tasks, specification, decoder } = actor.clone();
     let decoder_rank = decoder.as_ref().and_then(|name| DECODERS.iter().position(|&known| known == name));
     // What the paper's models are told by comes first.
     let form = SpecificationForm::ALL.iter().position(|form| Some(form.name()) == specification.as_deref());
-    (experiment, variant(&name), form, Reverse(train_tasks), specification, decoder_rank, decoder)
+    (experiment, variant(&name), form, tag, Reverse(train_tasks), specification, decoder_rank, decoder)
 }
 
 /// Families in their order; within one the held-out tasks first, since they are what counts.

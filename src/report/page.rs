@@ -13,10 +13,11 @@ use crate::report::chart::lines::{self, LinePlot};
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::chart::{Key, PANEL, Panel, color_of, distinct, has_paper_encoder};
 use crate::report::claims::{Claim, Verdict};
+use crate::report::markdown;
 use crate::report::metrics::{self, Curve};
 use crate::report::order::{self, DECODERS};
 use crate::report::summary::{Actor, Aggregate, Fact, Report, SuiteResult};
-use crate::report::tables::{self, AdversaryRow, CostRow, HeatGrid, ModelRow};
+use crate::report::tables::{self, AdversaryRow, CostRow, DetectionRow, HeatGrid, ModelRow, PushRow};
 
 /// Most headline figures.
 const N_TILES: usize = 4;
@@ -44,10 +45,14 @@ struct Page<'a> {
     figure_keys: Vec<Key>,
     has_paper_encoder: bool,
     adversary: Vec<AdversaryRow>,
+    pushes: Vec<PushRow>,
     heat: Vec<HeatGrid>,
+    detections: Vec<DetectionRow>,
     models: Vec<ModelRow>,
     cost_stages: Vec<String>,
     costs: Vec<CostRow>,
+    /// Program, commits, training seeds, cost.
+    made_by: String,
     total_cpu_mins: String,
 }
 
@@ -96,12 +101,29 @@ struct Row {
     mean: String,
     low: String,
     high: String,
-    /// Lowest and highest of the seeds, when there are several.
-    range: Option<(String, String)>,
+    /// Lowest and highest of the seeds, and the interval of their mean, when there are several.
+    spread: Option<Spread>,
     seeds: u64,
     episodes: String,
     paper: Option<String>,
     starts_suite: bool,
+}
+
+/// How much training seeds differ.
+#[derive(Serialize)]
+struct Spread {
+    lowest: String,
+    highest: String,
+    low: String,
+    high: String,
+}
+
+impl Spread {
+    fn of(row: &Aggregate) -> Option<Self> {
+        let (low, high) = row.seeds_low.zip(row.seeds_high)?;
+        let (lowest, highest) = (percent(row.lowest_success_rate), percent(row.highest_success_rate));
+        Some(Self { lowest, highest, low: percent(low), high: percent(high) })
+    }
 }
 
 /// A line of the table of training seeds.
@@ -148,10 +170,13 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
         figure_keys: figure_keys(in_figures()),
         has_paper_encoder: in_figures().any(|variant| has_paper_encoder(variant)),
         adversary: tables::adversary(&report.figures),
+        pushes: tables::pushes(&report.aggregates),
         heat: tables::heat(&report.grids),
+        detections: tables::detections(&report.detections),
         models: tables::models(&report.models),
         cost_stages,
         costs,
+        made_by: markdown::made_by(report),
         total_cpu_mins: format!("{:.1}", report.costs.iter().map(|cost| cost.cpu_secs).sum::<f64>() / 60.0),
     };
     let mut environment = Environment::new();
@@ -267,7 +292,7 @@ fn rows(aggregates: &[Aggregate]) -> Vec<Row> {
         mean: percent(row.mean_success_rate),
         low: percent(row.wilson_low),
         high: percent(row.wilson_high),
-        range: (row.seeds > 1).then(|| (percent(row.lowest_success_rate), percent(row.highest_success_rate))),
+        spread: Spread::of(row),
         seeds: row.seeds,
         episodes: thousands(row.episodes),
         paper: row.paper_success_rate.map(percent),

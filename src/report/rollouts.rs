@@ -41,8 +41,10 @@ const COLUMNS: [(&str, DataType); 17] = [
 
 /// What a file does not say of itself: to which experiment it belongs.
 const EXPERIMENT: &str = "experiment";
+/// Nor what tells its model apart from others of its variant.
+const TAG: &str = "tag";
 /// What tells actors apart; see [`Actor`].
-const ACTOR: [&str; 5] = [EXPERIMENT, "variant", "train_tasks", "specification", "decoder"];
+const ACTOR: [&str; 6] = [EXPERIMENT, "variant", TAG, "train_tasks", "specification", "decoder"];
 const MICROS_PER_SEC: f64 = 1e6;
 
 /// The rollouts of one model in one suite.
@@ -50,6 +52,8 @@ const MICROS_PER_SEC: f64 = 1e6;
 pub struct RolloutsInput {
     /// Of which experiment.
     pub experiment: String,
+    /// What tells the model apart from others of its variant.
+    pub tag: Option<String>,
     /// Its rollouts.parquet.
     pub path: PathBuf,
 }
@@ -72,7 +76,8 @@ pub(super) fn read(inputs: &[RolloutsInput]) -> Result<Rollouts, ReportError> {
     }
     let frames = inputs.iter().map(|input| {
         let experiment = lit(input.experiment.clone()).alias(EXPERIMENT);
-        Ok(scan(&input.path, &COLUMNS)?.with_column(experiment))
+        let tag = input.tag.clone().map_or_else(|| lit(NULL).cast(DataType::String), lit).alias(TAG);
+        Ok(scan(&input.path, &COLUMNS)?.with_columns([experiment, tag]))
     });
     let frames = frames.collect::<Result<Vec<_>, ReportError>>()?;
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
@@ -113,14 +118,15 @@ fn key(more: &[&str]) -> Vec<Expr> {
 
 /// The actor of each row of a table that was grouped by [`key`].
 fn actors(rows: &Rows<'_>) -> Result<Vec<Actor>, ReportError> {
-    let (experiments, variants) = (rows.text(EXPERIMENT)?, rows.text("variant")?);
+    let (experiments, variants, tags) = (rows.text(EXPERIMENT)?, rows.text("variant")?, rows.optional_text(TAG)?);
     let train_tasks = rows.optional_whole("train_tasks")?;
     let (specifications, decoders) = (rows.optional_text("specification")?, rows.optional_text("decoder")?);
-    let names = experiments.into_iter().zip(variants);
+    let names = experiments.into_iter().zip(variants).zip(tags);
     let settings = train_tasks.into_iter().zip(specifications).zip(decoders);
-    let actor = |((experiment, variant), ((train_tasks, specification), decoder))| Actor {
+    let actor = |(((experiment, variant), tag), ((train_tasks, specification), decoder))| Actor {
         experiment,
         variant,
+        tag,
         train_tasks,
         specification,
         decoder,

@@ -10,7 +10,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::PaperValue;
-use crate::report::claims::Claim;
+use crate::report::claims::{Claim, Note};
+use crate::report::detections::DetectionError;
 use crate::report::figures::{Figure, Grid};
 use crate::trace::SpecificationForm;
 
@@ -32,6 +33,8 @@ pub struct Report {
     pub aggregates: Vec<Aggregate>,
     /// What the paper claims, judged by these results.
     pub claims: Vec<Claim>,
+    /// What is to be said of variants that see beside their figures.
+    pub notes: Vec<Note>,
     /// The paper's figures from these results.
     pub figures: Vec<Figure>,
     /// Table Clean-up by bowls and forks.
@@ -40,6 +43,8 @@ pub struct Report {
     pub divergences: Vec<Divergence>,
     /// What failed rollouts did wrong first.
     pub errors: Vec<FirstError>,
+    /// Errors of detectors in the demonstrations that models behind them were given.
+    pub detections: Vec<DetectionError>,
     /// The end of each training curve; the whole curves are in curves.csv.
     pub training: Vec<TrainingEnd>,
     /// The trained models.
@@ -57,22 +62,29 @@ pub struct Report {
 }
 
 impl Actor {
-    /// The variant, and the form of its task specification where it is not the paper's.
+    /// The variant, the form of its task specification where it is not the paper's, and its tag.
     pub(super) fn model(&self) -> String {
-        model_name(&self.variant, self.specification.as_deref().unwrap_or_default())
+        model_name(&self.variant, self.specification.as_deref().unwrap_or_default(), self.tag.as_deref())
     }
 
-    /// Whether it is told by a demonstration what to do, as all of the paper's models are.
+    /// Whether it stands for its variant in the paper's figures and claims: told by a demonstration what to do, as all
+    /// of the paper's models are, and not trained otherwise on purpose.
+    pub(super) fn is_the_papers(&self) -> bool {
+        self.is_demonstrated() && self.tag.is_none()
+    }
+
+    /// Whether it is told by a demonstration what to do.
     pub(super) fn is_demonstrated(&self) -> bool {
         self.specification.as_deref() != Some(SpecificationForm::Instructions.name())
     }
 }
 
-/// A variant's name, and the form of its task specification where it is not the paper's.
-pub(super) fn model_name(variant: &str, specification: &str) -> String {
+/// A variant's name, the form of its task specification where it is not the paper's, and its tag.
+pub(super) fn model_name(variant: &str, specification: &str, tag: Option<&str>) -> String {
+    let tag = tag.map(|tag| format!(" ({tag})")).unwrap_or_default();
     match specification {
-        form if form == SpecificationForm::Instructions.name() => format!("{variant} by {form}"),
-        _ => variant.to_owned(),
+        form if form == SpecificationForm::Instructions.name() => format!("{variant} by {form}{tag}"),
+        _ => format!("{variant}{tag}"),
     }
 }
 
@@ -83,6 +95,8 @@ pub struct Actor {
     pub experiment: String,
     /// The model's variant.
     pub variant: String,
+    /// What tells it apart from other models of its variant; null for most.
+    pub tag: Option<String>,
     /// How many tasks it was trained on; null for an oracle.
     pub train_tasks: Option<i64>,
     /// What a demonstration is given as; null for an oracle.
@@ -143,12 +157,21 @@ pub struct Aggregate {
     pub lowest_success_rate: f64,
     /// The highest share of a seed.
     pub highest_success_rate: f64,
+    /// Lower end of the interval of the mean over training seeds, by Student's t at 95 %, cut off at 0; null with one
+    /// seed. Where all seeds have the same share it has no width: see the other interval then.
+    pub seeds_low: Option<f64>,
+    /// Upper end of that interval, cut off at 1; null with one seed.
+    pub seeds_high: Option<f64>,
     /// Lower end of the interval of all seeds' rollouts taken together.
     pub wilson_low: f64,
     /// Upper end of the interval of all seeds' rollouts taken together.
     pub wilson_high: f64,
     /// Failures by cause.
     pub causes: BTreeMap<String, u64>,
+    /// An adversary's pushes in all rollouts; null in a suite without one.
+    pub pushes: Option<u64>,
+    /// The bodies that they toppled.
+    pub toppled: Option<u64>,
     /// The paper's share of successes, where it gives one.
     pub paper_success_rate: Option<f64>,
 }
@@ -195,6 +218,8 @@ pub struct ModelSummary {
     pub experiment: String,
     /// Its variant.
     pub variant: String,
+    /// What tells it apart from other models of its variant; null for most.
+    pub tag: Option<String>,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
     /// What it reads as task specification.
@@ -227,6 +252,8 @@ pub struct TrainingEnd {
     pub experiment: String,
     /// The model's variant.
     pub variant: String,
+    /// What tells it apart from other models of its variant; null for most.
+    pub tag: Option<String>,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
     /// What it reads as task specification.

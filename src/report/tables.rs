@@ -1,11 +1,13 @@
-//! The page's smaller tables: the adversary, clean-up by bowls and forks, models, costs.
+//! The page's smaller tables: the adversary and its pushes, clean-up by bowls and forks, detectors, models, costs.
 
 use serde::Serialize;
 
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::chart::{color_of, distinct};
+use crate::report::detections::{DetectionError, InSight};
 use crate::report::figures::{Figure, Grid, Series};
-use crate::report::summary::{ModelSummary, StageCost, model_name};
+use crate::report::page::name_of;
+use crate::report::summary::{Aggregate, ModelSummary, StageCost, model_name};
 
 /// Success without an adversary and with one that pushes after a quarter of the placements.
 #[derive(Serialize)]
@@ -38,6 +40,41 @@ fn adversary_row(series: &Series) -> Option<AdversaryRow> {
         with: ours_with,
         loss: ours_loss,
         paper: paper(0).zip(paper(25)).map(|(without, with)| told(without, with)),
+    })
+}
+
+/// What an adversary did to one actor's rollouts in a suite.
+#[derive(Serialize)]
+pub(super) struct PushRow {
+    suite: String,
+    variant: String,
+    color: usize,
+    rollouts: String,
+    success: String,
+    pushes: String,
+    pushes_a_rollout: String,
+    toppled: String,
+    toppled_a_push: String,
+}
+
+/// One row for each actor and suite with an adversary.
+pub(super) fn pushes(aggregates: &[Aggregate]) -> Vec<PushRow> {
+    aggregates.iter().filter_map(push_row).collect()
+}
+
+fn push_row(row: &Aggregate) -> Option<PushRow> {
+    let (pushes, toppled) = row.pushes.zip(row.toppled)?;
+    let share = |count: u64, of: u64| format!("{:.2}", count as f64 / of.max(1) as f64);
+    Some(PushRow {
+        suite: row.suite.clone(),
+        variant: name_of(&row.actor),
+        color: color_of(&row.actor.variant),
+        rollouts: thousands(row.episodes),
+        success: percent(row.mean_success_rate),
+        pushes: thousands(pushes),
+        pushes_a_rollout: share(pushes, row.episodes),
+        toppled: thousands(toppled),
+        toppled_a_push: share(toppled, pushes),
     })
 }
 
@@ -92,24 +129,64 @@ fn heat_grid(grid: &Grid) -> HeatGrid {
     HeatGrid { variant: grid.variant.clone(), rows: bowls.into_iter().map(row).collect(), forks: forks.clone() }
 }
 
-/// The models of one variant and number of tasks.
+/// The errors of a detector.
 #[derive(Serialize)]
-pub(super) struct ModelRow {
-    experiment: String,
+pub(super) struct DetectionRow {
+    suite: String,
     variant: String,
     color: usize,
     tasks: String,
-    seeds: usize,
-    parameters: String,
+    seeds: u64,
+    in_sight: &'static str,
+    /// Whether it is of one part of the row above that tells of all.
+    is_part: bool,
+    detections: String,
+    median: String,
+    mean_absolute: [String; 3],
+    deviation: String,
+    percentiles: [String; 2],
+    over: String,
+}
+
+/// One row a model, suite and how much is in sight.
+pub(super) fn detections(errors: &[DetectionError]) -> Vec<DetectionRow> {
+    let cm = |value: f64| format!("{value:.2}");
+    let row = |error: &DetectionError| DetectionRow {
+        suite: error.suite.clone(),
+        variant: error.variant.clone(),
+        color: color_of(&error.variant),
+        tasks: thousands(error.train_tasks.max(0) as u64),
+        seeds: error.seeds,
+        in_sight: error.in_sight.words(),
+        is_part: error.in_sight != InSight::All,
+        detections: thousands(error.detections),
+        median: cm(error.median_cm),
+        mean_absolute: error.mean_absolute_cm.map(cm),
+        deviation: cm(error.deviation_cm),
+        percentiles: [error.percentile_95_cm, error.percentile_99_cm].map(cm),
+        over: percent(error.over_2_cm),
+    };
+    errors.iter().map(row).collect()
+}
+
+/// The models of one variant and number of tasks.
+#[derive(Serialize)]
+pub(super) struct ModelRow {
+    pub(super) experiment: String,
+    pub(super) variant: String,
+    color: usize,
+    pub(super) tasks: String,
+    pub(super) seeds: usize,
+    pub(super) parameters: String,
     /// CPU-seconds of a training, on average.
-    cpu_secs: Option<String>,
+    pub(super) cpu_secs: Option<String>,
 }
 
 /// One row for all seeds of a model. They stand together, as pipeline files list them.
 pub(super) fn models(models: &[ModelSummary]) -> Vec<ModelRow> {
     let same = |a: &ModelSummary, b: &ModelSummary| {
-        (&a.experiment, &a.variant, &a.specification, a.train_tasks)
-            == (&b.experiment, &b.variant, &b.specification, b.train_tasks)
+        (&a.experiment, &a.variant, &a.tag, &a.specification, a.train_tasks)
+            == (&b.experiment, &b.variant, &b.tag, &b.specification, b.train_tasks)
     };
     models.chunk_by(same).map(model_row).collect()
 }
@@ -119,7 +196,7 @@ fn model_row(seeds: &[ModelSummary]) -> ModelRow {
     let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
     ModelRow {
         experiment: seeds[0].experiment.clone(),
-        variant: model_name(&seeds[0].variant, &seeds[0].specification),
+        variant: model_name(&seeds[0].variant, &seeds[0].specification, seeds[0].tag.as_deref()),
         color: color_of(&seeds[0].variant),
         tasks: thousands(seeds[0].train_tasks.max(0) as u64),
         seeds: seeds.len(),

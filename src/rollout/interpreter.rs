@@ -234,6 +234,7 @@ impl<'t> Running<'t> {
             frames: self.world.frames().to_vec(),
             specification_frames: self.specification.n_frames as u32,
             calls,
+            pushes: self.world.pushes().unwrap_or_default().to_vec(),
             outcome,
         })?;
         Ok(RolloutEpisode {

@@ -19,7 +19,7 @@ use rayon::iter::{
 
 use crate::model::{
     self, CoreOutput, Decisions, Decoder, Given, LabelScores, MAX_ARGUMENTS, ModelConfig, ModelError, Network,
-    NetworkUse, Windows,
+    NetworkUse, Pictures, Windows,
 };
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, Query, Specification};
@@ -229,6 +229,10 @@ impl<N: Network> Policy for LearnedPolicy<N> {
 
     fn reads(&self) -> SpecificationForm {
         self.reads
+    }
+
+    fn detect(&self, pictures: &Pictures) -> Option<Vec<f32>> {
+        N::detected(&self.network.perceive(pictures)).map(<[f32]>::to_vec)
     }
 
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {

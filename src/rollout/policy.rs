@@ -85,6 +85,11 @@ pub trait Policy {
         SpecificationForm::Trajectories
     }
 
+    /// The observation rows that a detector finds in pictures, `[F, 3 N + 2]`; nothing from a policy without one.
+    fn detect(&self, _pictures: &Pictures) -> Option<Vec<f32>> {
+        None
+    }
+
     /// One decision a query, in order. Must not depend on which queries come together, but may on earlier ones of the
     /// same running call.
     fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;

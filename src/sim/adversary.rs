@@ -21,7 +21,7 @@ use crate::robot::{GRASP_M, HOVER_M, RobotApi as _};
 use crate::scene::{BodyIndex, Mobility};
 use crate::seed::Seed;
 use crate::sim::{SimError, Simulation};
-use crate::trace::Push;
+use crate::trace::{Push, Span};
 
 /// Directions that a push is chosen from.
 const DIRECTIONS: usize = 16;
@@ -80,6 +80,8 @@ pub(super) struct Adversary {
 
 /// What a push did.
 pub(super) struct Pushed {
+    /// The last frame before it.
+    frame_before: u32,
     body: BodyIndex,
     impulse_ns: [f32; 3],
     toppled: Vec<BodyIndex>,
@@ -115,28 +117,30 @@ impl Simulation {
         let lowest = (level * tower.len() as f32) as usize % tower.len();
         let body = tower[lowest];
         let impulse_ns = self.direction(&tower, &mut rng) * impulse_ns;
-        self.push(&tower[..=lowest], impulse_ns);
+        let frame_before = self.push(&tower[..=lowest], impulse_ns);
         let toppled = self.toppled(&supports);
         let state = self.state();
         let fell_off = self.watch.forgive(&self.scene, &state);
-        Some(Pushed { body, impulse_ns: impulse_ns.to_array(), toppled, fell_off })
+        Some(Pushed { frame_before, body, impulse_ns: impulse_ns.to_array(), toppled, fell_off })
     }
 
-    /// Writes down a push with the frame that shows what came of it: the newest.
+    /// Writes down a push, up to the frame that shows what came of it: the newest.
     pub(super) fn tell(&mut self, pushed: Pushed) {
-        let frame = (self.frames.len() as u32).saturating_sub(1);
-        let Pushed { body, impulse_ns, toppled, fell_off: _ } = pushed;
+        let Pushed { frame_before, body, impulse_ns, toppled, fell_off: _ } = pushed;
+        let frames = Span { begin: frame_before, end: self.frames.len() as u32 };
         self.adversary.iter_mut().for_each(|adversary| {
-            adversary.pushes.push(Push { frame, body, impulse_ns, toppled: toppled.clone() });
+            adversary.pushes.push(Push { frames, body, impulse_ns, toppled: toppled.clone() });
         });
     }
 
-    /// The gripper gives way, each body gets the impulse, all comes to rest.
-    fn push(&mut self, bodies: &[BodyIndex], impulse_ns: Vector) {
+    /// The gripper gives way, each body gets the impulse, all comes to rest. Gives the last frame before the impulse.
+    fn push(&mut self, bodies: &[BodyIndex], impulse_ns: Vector) -> u32 {
         self.rise(self.gripper.tool.position.z + HOVER_M - GRASP_M);
+        let frame_before = (self.frames.len() as u32).saturating_sub(1);
         bodies.iter().for_each(|&body| self.world.push(body, impulse_ns));
         // What does not come to rest in time is seen to move in the frame.
         let _rested = self.rest();
+        frame_before
     }
 
     /// What each body stands on: a movable body, or `None`.

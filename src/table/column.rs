@@ -43,7 +43,7 @@ impl Column {
             (Form::Required, Value::Text) => Self::Text(Vec::new()),
             (Form::Optional, Value::Text) => Self::OptionalText(Vec::new()),
             (Form::List, Value::Text) => Self::TextList(Vec::new()),
-            (Form::Optional | Form::List, Value::Boolean) | (_, Value::Picture) => return None,
+            (Form::Optional | Form::List, Value::Boolean) | (_, Value::Picture | Value::Channels) => return None,
         })
     }
 

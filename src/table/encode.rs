@@ -48,6 +48,14 @@ impl Encoder {
             Values::Int64Vector(values, width) => self.vectors::<Int64Type>(column, values, width),
             Values::Float32Vector(values, width) => self.vectors::<FloatType>(column, values, width),
             Values::Float64Vector(values, width) => self.vectors::<DoubleType>(column, values, width),
+            Values::Channels(rows) => {
+                // Three lists, and in each a list of one value: only the first value of a row begins anew.
+                self.definition.clear();
+                self.definition.resize(3 * rows.len(), 3);
+                self.repetition.clear();
+                self.repetition.extend(rows.iter().flat_map(|_| [0, 1, 1]));
+                self.with_levels::<DoubleType>(column, rows.as_flattened())
+            }
             Values::Pictures(rows) => self.optional_texts(column, rows.iter().map(|row| Some(row.clone().into()))),
         }
     }

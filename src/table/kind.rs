@@ -20,6 +20,8 @@ pub enum Value {
     Text,
     /// An encoded picture: `LeRobot`'s struct of bytes and path.
     Picture,
+    /// A 64-bit float for each channel of a picture: `LeRobot`'s lists `[3][1][1]`.
+    Channels,
 }
 
 /// How many values a row has.
@@ -56,14 +58,13 @@ impl ColumnKind {
         if is_picture(field) {
             return Some(Self { value: Value::Picture, form: Form::Required });
         }
-        let is_list = field.get_basic_info().converted_type() == ConvertedType::LIST
-            || matches!(field.get_basic_info().logical_type_ref(), Some(LogicalType::List));
-        let [list] = field.get_fields() else { return None };
-        if !is_list || !list.is_group() {
-            return None;
+        let element = element_of(field)?;
+        if element.is_primitive() {
+            return value_of(element).map(|value| Self { value, form: Form::List });
         }
-        let [element] = list.get_fields() else { return None };
-        element.is_primitive().then(|| value_of(element)).flatten().map(|value| Self { value, form: Form::List })
+        let innermost = element_of(element_of(element)?)?;
+        let is_channels = innermost.is_primitive() && value_of(innermost) == Some(Value::Float64);
+        is_channels.then_some(Self { value: Value::Channels, form: Form::Required })
     }
 
     /// Whether a column of this kind can be read where `expected` is asked for: values are of the same type, and a
@@ -71,6 +72,21 @@ impl ColumnKind {
     pub(crate) fn can_be_read_as(self, expected: Self) -> bool {
         self.value == expected.value && (self.form == Form::List) == (expected.form == Form::List)
     }
+}
+
+/// What a list is of; `None` where a field is no list.
+fn element_of(field: &Type) -> Option<&Type> {
+    if field.is_primitive() {
+        return None;
+    }
+    let is_list = field.get_basic_info().converted_type() == ConvertedType::LIST
+        || matches!(field.get_basic_info().logical_type_ref(), Some(LogicalType::List));
+    let [list] = field.get_fields() else { return None };
+    if !is_list || !list.is_group() {
+        return None;
+    }
+    let [element] = list.get_fields() else { return None };
+    Some(element)
 }
 
 /// Bytes, and a path that is not used.
@@ -104,6 +120,7 @@ impl fmt::Display for Value {
             Self::Boolean => "boolean",
             Self::Text => "text",
             Self::Picture => "picture",
+            Self::Channels => "float64 for each channel",
         })
     }
 }

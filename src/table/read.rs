@@ -14,7 +14,7 @@ use parquet::file::metadata::ParquetMetaData;
 use crate::artifact::IoError;
 use crate::table::arrays::append_array;
 use crate::table::guard::guarded;
-use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema, Value};
+use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
 
 /// Rows of one batch.
 const BATCH_ROWS: usize = 8192;
@@ -47,41 +47,6 @@ pub(crate) fn read_further(
     let mut columns = reader.empty_columns();
     while reader.append_batch(&mut columns)? {}
     Ok(Columns::new(path, schema.name(), columns))
-}
-
-/// Reads the encoded pictures of some rows.
-///
-/// # Errors
-///
-/// As [`read`]; when there are fewer rows, or a row has no picture.
-pub(crate) fn read_pictures(
-    path: &Path,
-    schema: &TableSchema,
-    name: &str,
-    rows: std::ops::Range<usize>,
-) -> Result<Vec<Vec<u8>>, TableError> {
-    guarded(path, || {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder =
-            ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
-        let kind = ColumnKind { value: Value::Picture, form: Form::Required };
-        let roots = find_roots(path, schema.name(), &[(name.to_owned(), kind)], builder.metadata())?;
-        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-        let builder = builder.with_projection(mask).with_offset(rows.start).with_limit(rows.len());
-        let mut pictures = Vec::with_capacity(rows.len());
-        for batch in builder.build().map_err(TableError::parquet(path))? {
-            let batch = batch.map_err(TableError::arrow(path))?;
-            let column = batch.column(0).as_struct_opt().and_then(|fields| fields.column_by_name("bytes"));
-            let bytes = column.and_then(|column| column.as_binary_opt::<i32>());
-            pictures.extend(bytes.into_iter().flatten().flatten().map(<[u8]>::to_vec));
-        }
-        if pictures.len() == rows.len() {
-            return Ok(pictures);
-        }
-        let (column, row) = (name.to_owned(), (rows.start + pictures.len()) as u64);
-        Err(TableError::Null { path: path.to_owned(), schema: schema.name(), column, row })
-    })
 }
 
 /// Reads a table in batches of some thousand rows.
@@ -237,7 +202,7 @@ pub fn file_columns(path: &Path) -> Result<Vec<(String, Option<ColumnKind>)>, Ta
 }
 
 /// Positions of the wanted columns among the file's.
-fn find_roots(
+pub(super) fn find_roots(
     path: &Path,
     schema: &'static str,
     columns: &[(String, ColumnKind)],

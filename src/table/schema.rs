@@ -30,6 +30,12 @@ impl TableSchema {
     /// One row per training step and level that was logged.
     pub const METRICS: Self = Self::new("metrics", include_str!("../../schemas/parquet/metrics.message"));
 
+    /// One row per logged training step of a detector.
+    pub const DETECTOR_METRICS: Self =
+        Self::new("detector_metrics", include_str!("../../schemas/parquet/detector_metrics.message"));
+    /// One row per body and boundary frame of a demonstration in which a detector looked for it.
+    pub const DETECTIONS: Self = Self::new("detections", include_str!("../../schemas/parquet/detections.message"));
+
     /// A contract from its embedded text.
     pub const fn new(name: &'static str, text: &'static str) -> Self {
         Self { name, text }

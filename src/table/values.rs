@@ -30,6 +30,8 @@ pub(crate) enum Values<'a> {
     Float64Vector(&'a [f64], usize),
     /// Encoded pictures.
     Pictures(&'a [Vec<u8>]),
+    /// A number for each channel.
+    Channels(&'a [[f64; 3]]),
 }
 
 impl<'a> Values<'a> {
@@ -69,6 +71,7 @@ impl<'a> Values<'a> {
             Self::OptionalText(_) | Self::OptionalWord(..) => (Form::Optional, Value::Text),
             Self::TextList(_) => (Form::List, Value::Text),
             Self::Pictures(_) => (Form::Required, Value::Picture),
+            Self::Channels(_) => (Form::Required, Value::Channels),
         };
         ColumnKind { value, form }
     }
@@ -95,6 +98,7 @@ impl<'a> Values<'a> {
             Self::Float32Vector(values, width) => values.len() / width,
             Self::Float64Vector(values, width) => values.len() / width,
             Self::Pictures(rows) => rows.len(),
+            Self::Channels(rows) => rows.len(),
         }
     }
 }

@@ -39,6 +39,7 @@ fn check_task(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
         }
     }
     check_slots(task_idx, task)?;
+    check_blocks(task_idx, task)?;
     check_moves(task_idx, task)?;
     if task.family != Family::ObjectSorting {
         check_towers(task_idx, task)?;
@@ -87,6 +88,22 @@ fn check_slot(family: Family, place: &str, slot: SlotIndex, part: Part) -> Resul
         (Family::TableCleanup, Part::Target) => (slot != FORK, "bowl or tray"),
     };
     if fits { Ok(()) } else { Err(TaskSetError::WrongKind { place, slot: slot_name(family, slot), expected }) }
+}
+
+/// What a task moves must be within reach.
+fn check_blocks(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
+    let Some(blocks) = task.blocks else { return Ok(()) };
+    let most = task.family.max_blocks().unwrap_or(0);
+    if !(2..most).contains(&blocks) {
+        return Err(TaskSetError::Blocks { task: task_idx, blocks, family: task.family });
+    }
+    for (goal_idx, goal) in task.goals.iter().enumerate() {
+        if let Some(slot) = [goal.source, goal.target].into_iter().find(|slot| slot.0 >= blocks) {
+            let slot = slot_name(task.family, slot);
+            return Err(TaskSetError::Aside { place: goal_place(task_idx, goal_idx), slot, blocks });
+        }
+    }
+    Ok(())
 }
 
 fn check_moves(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {

@@ -77,6 +77,9 @@ struct TaskEntry {
     goals: Vec<GoalEntry>,
     /// What must hold in the end.
     conditions: Vec<ConditionEntry>,
+    /// Block Stacking: only the first so many blocks, 2 to 7, are within reach; left out when all eight are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    blocks: Option<u16>,
 }
 
 /// Brings one thing onto or into another.
@@ -171,6 +174,7 @@ fn entry(task: &Task) -> TaskEntry {
         split: task.split,
         goals: task.goals.iter().map(goal).collect(),
         conditions: task.conditions.iter().map(condition).collect(),
+        blocks: task.blocks,
     }
 }
 
@@ -187,7 +191,7 @@ impl SlotNames<'_> {
     }
 
     fn task(&self, task_idx: usize, entry: TaskEntry) -> Result<Task, TaskFileError> {
-        let TaskEntry { id, split, goals, conditions } = entry;
+        let TaskEntry { id, split, goals, conditions, blocks } = entry;
         let goals = goals.iter().enumerate().map(|(at, goal)| {
             let place = format!("tasks[{task_idx}].goals[{at}]");
             let (source, target) = self.pair(&place, ("source", &goal.source), ("target", &goal.target))?;
@@ -206,7 +210,7 @@ impl SlotNames<'_> {
         });
         let goals = goals.collect::<Result<_, TaskFileError>>()?;
         let conditions = conditions.collect::<Result<_, TaskFileError>>()?;
-        Ok(Task { id, family: self.family, goals, conditions, split })
+        Ok(Task { id, family: self.family, goals, conditions, split, blocks })
     }
 
     fn pair(

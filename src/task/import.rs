@@ -211,7 +211,7 @@ fn task(node: &Node<'_>, objects: &[&str], family: &mut Option<Family>, split: S
     let Some(family) = *family else { return Err(node.field("goals")?.problem(ImportProblem::NotA("a filled list"))) };
     let conditions = constraints.items()?.map(|item| condition(&item, objects, family));
     let conditions = conditions.collect::<Result<_, Problem>>()?;
-    Ok(Task { id, family, goals, conditions, split })
+    Ok(Task { id, family, goals, conditions, split, blocks: None })
 }
 
 fn goal_family(node: &Node<'_>) -> Result<Family, Problem> {

@@ -5,27 +5,15 @@
 //! Metres; world frame, the table's surface at z = 0.
 
 pub(super) mod cleanup;
+pub(super) mod stacking;
 
 use rand::Rng as _;
 use rand::seq::SliceRandom as _;
 
-use crate::geometry::{Pose, Vec3, horizontal_distance, upright};
+use crate::geometry::{Pose, Vec3, upright};
 use crate::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
 use crate::task::Family;
-
-/// Edge of a stacking block.
-const BLOCK_M: f32 = 0.05;
-/// Distance between the cells of the 4x4 grid that blocks start on.
-const BLOCK_PITCH_M: f32 = 0.1;
-/// How far a block may start from its cell's middle, in x and in y.
-const BLOCK_JITTER_M: f32 = 0.03;
-/// Least distance between two blocks' centres at the start: fingers must fit between neighbours.
-const BLOCK_SPACING_M: f32 = 0.08;
-/// Positions that are tried for a block before all are scattered anew: its neighbours may leave it no room.
-const MAX_TRIES: usize = 64;
-/// Scatterings that are tried before blocks start in the middles of their cells.
-const MAX_LAYOUTS: usize = 1000;
 
 /// Cells that sorting objects start on, and their pitch.
 const SORTING_CELLS: [usize; 2] = [9, 7];
@@ -43,17 +31,6 @@ pub const CONTAINER_HALF_M: f32 = CONTAINER_INNER_M[0] + CONTAINER_WALL_M;
 /// The most instances of one category.
 pub(super) const MAX_INSTANCES: u16 = 10;
 
-const BLOCK_LETTERS: [&str; 8] = ["A", "B", "C", "D", "E", "F", "G", "H"];
-const BLOCK_COLORS: [[u8; 3]; 8] = [
-    [230, 57, 70],
-    [244, 140, 6],
-    [255, 209, 64],
-    [82, 183, 78],
-    [42, 157, 190],
-    [58, 90, 200],
-    [144, 80, 190],
-    [236, 120, 180],
-];
 const CATEGORY_NAMES: [&str; 4] = ["cube", "can", "ball", "brick"];
 const CATEGORY_COLORS: [[u8; 3]; 4] = [[214, 64, 69], [48, 128, 200], [240, 176, 32], [84, 168, 88]];
 const CONTAINER_NAMES: [&str; 4] = ["bin_1", "bin_2", "bin_3", "bin_4"];
@@ -64,7 +41,7 @@ const CONTAINER_COLORS: [[u8; 3]; 4] = [[150, 130, 110], [110, 130, 150], [130, 
 pub struct Trial {
     /// Number among the task's trials.
     pub index: u32,
-    /// Instances of each category; empty for Block Stacking. See [`Task::counts`](crate::task::Task::counts).
+    /// Instances of each category; empty for Block Stacking with all blocks. See [`Task::counts`](crate::task::Task::counts).
     pub counts: Vec<u16>,
     /// What the initial positions are drawn from.
     pub seed: Seed,
@@ -73,7 +50,7 @@ pub struct Trial {
 /// What stands on the table in a trial of a family.
 pub fn scene(family: Family, counts: &[u16]) -> Scene {
     match family {
-        Family::BlockStacking => stacking_scene(),
+        Family::BlockStacking => stacking::scene(counts),
         Family::ObjectSorting => sorting_scene(counts),
         Family::TableCleanup => cleanup::scene(counts),
     }
@@ -83,7 +60,7 @@ pub fn scene(family: Family, counts: &[u16]) -> Scene {
 pub(crate) fn slot_name(family: Family, slot: SlotIndex) -> String {
     let index = usize::from(slot.0);
     match family {
-        Family::BlockStacking => format!("block_{}", BLOCK_LETTERS[index % 8]),
+        Family::BlockStacking => stacking::slot_name(index),
         Family::ObjectSorting => [CATEGORY_NAMES, CONTAINER_NAMES].concat()[index % 8].to_owned(),
         Family::TableCleanup => cleanup::SLOT_NAMES[index % 6].to_owned(),
     }
@@ -91,22 +68,6 @@ pub(crate) fn slot_name(family: Family, slot: SlotIndex) -> String {
 
 fn single_slot(index: usize, name: String) -> Slot {
     Slot { name, bodies: vec![BodyIndex(index as u16)] }
-}
-
-fn stacking_scene() -> Scene {
-    let shape = Shape::Cuboid { half_extents_m: [BLOCK_M / 2.0; 3] };
-    let names: Vec<String> = (0..8).map(|index| slot_name(Family::BlockStacking, SlotIndex(index))).collect();
-    let body = |(name, color): (&String, &[u8; 3])| Body {
-        name: name.clone(),
-        shape,
-        mobility: Mobility::Movable,
-        color: *color,
-    };
-    Scene {
-        bodies: names.iter().zip(&BLOCK_COLORS).map(body).collect(),
-        slots: names.into_iter().enumerate().map(|(index, name)| single_slot(index, name)).collect(),
-        table_half_m: [0.6, 0.6],
-    }
 }
 
 fn category_shape(category: usize) -> Shape {
@@ -150,43 +111,13 @@ pub fn initial_state(family: Family, scene: &Scene, seed: Seed) -> SceneState {
     let all_upright =
         |positions: Vec<Vec3>| -> Vec<Pose> { positions.into_iter().map(|position| upright(position, 0.0)).collect() };
     let bodies_in_world = match family {
-        Family::BlockStacking => all_upright(stacking_positions(scene, &mut rng)),
+        Family::BlockStacking => all_upright(stacking::positions(scene, &mut rng)),
         Family::ObjectSorting => all_upright(sorting_positions(scene, &mut rng)),
         Family::TableCleanup => cleanup::poses(scene, &mut rng),
     };
     let reach = scene.table_half_m.map(|half| 0.5 * half);
     let gripper = Vec3::new(rng.random_range(-reach[0]..reach[0]), rng.random_range(-reach[1]..reach[1]), 0.3);
     SceneState { gripper_in_world: upright(gripper, 0.0), opening_m: 0.07, held: None, bodies_in_world }
-}
-
-fn stacking_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {
-    let mut cells: Vec<(usize, usize)> = (0..16).map(|cell| (cell % 4, cell / 4)).collect();
-    let scattered = (0..MAX_LAYOUTS).find_map(|_| {
-        cells.shuffle(rng);
-        scatter_blocks(&cells[..scene.bodies.len()], rng)
-    });
-    scattered.unwrap_or_else(|| cells.iter().take(scene.bodies.len()).map(|&cell| cell_middle(cell)).collect())
-}
-
-/// The middle of a cell of the grid that blocks start on.
-fn cell_middle((column, row): (usize, usize)) -> Vec3 {
-    let middle = |cell: usize| (cell as f32 - 1.5) * BLOCK_PITCH_M;
-    Vec3::new(middle(column), middle(row), BLOCK_M / 2.0)
-}
-
-/// One block a cell; nothing when the blocks before leave no room in a cell.
-fn scatter_blocks(cells: &[(usize, usize)], rng: &mut impl rand::Rng) -> Option<Vec<Vec3>> {
-    let mut positions: Vec<Vec3> = Vec::new();
-    for &cell in cells {
-        let free = (0..MAX_TRIES).find_map(|_| {
-            let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
-            let position = cell_middle(cell) + Vec3::new(jitter(), jitter(), 0.0);
-            let apart = |other: &Vec3| horizontal_distance(other, &position) >= BLOCK_SPACING_M;
-            positions.iter().all(apart).then_some(position)
-        });
-        positions.push(free?);
-    }
-    Some(positions)
 }
 
 fn sorting_positions(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Vec3> {

@@ -26,37 +26,60 @@ pub struct SampleError {
     pub limit: u32,
 }
 
+/// What tasks are drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TaskPool {
+    /// Their family.
+    pub family: Family,
+    /// See [`Task::blocks`].
+    pub blocks: Option<u16>,
+}
+
+impl From<Family> for TaskPool {
+    fn from(family: Family) -> Self {
+        Self { family, blocks: None }
+    }
+}
+
+impl TaskPool {
+    /// How many training tasks there are at most, and how many unseen ones beside `train` of them. Block Stacking
+    /// divides its end configurations as it is asked to; in the other families the two splits are fixed.
+    pub fn limits(self, train: u32) -> (u32, u32) {
+        match self.family {
+            Family::BlockStacking => {
+                let all = stacking::n_tasks(self.blocks);
+                (all, all.saturating_sub(train))
+            }
+            Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
+            Family::TableCleanup => (cleanup::N_TRAINING, cleanup::N_UNSEEN),
+        }
+    }
+}
+
 /// Draws tasks with distinct end configurations: `train` of them to train on, then `unseen` held-out ones.
 ///
 /// # Errors
 ///
 /// When there are not as many.
-pub fn sample(family: Family, train: u32, unseen: u32, seed: Seed) -> Result<TaskSet, SampleError> {
-    let (train_limit, unseen_limit) = split_limits(family);
+pub fn sample(pool: impl Into<TaskPool>, train: u32, unseen: u32, seed: Seed) -> Result<TaskSet, SampleError> {
+    let pool: TaskPool = pool.into();
+    let family = pool.family;
+    let (train_limit, unseen_limit) = pool.limits(train);
     for (split, asked, limit) in [(Split::Seen, train, train_limit), (Split::Unseen, unseen, unseen_limit)] {
         if asked > limit {
             return Err(SampleError { family, split, asked, limit });
         }
     }
     let tasks = match family {
-        Family::BlockStacking => stacking::sample(train as usize, unseen as usize, seed),
+        Family::BlockStacking => stacking::sample(pool.blocks, train as usize, unseen as usize, seed),
         Family::ObjectSorting => sorting::sample(train as usize, unseen as usize, seed),
         Family::TableCleanup => cleanup::sample(train as usize, unseen as usize, seed),
     };
     Ok(TaskSet { family, tasks })
 }
 
-/// How many training tasks and how many unseen ones a family has.
-pub fn split_limits(family: Family) -> (u32, u32) {
-    match family {
-        Family::BlockStacking => (stacking::split_limit(), stacking::split_limit()),
-        Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
-        Family::TableCleanup => (cleanup::N_TRAINING, cleanup::N_UNSEEN),
-    }
-}
-
 /// A task whose conditions are what its goals bring about.
 fn task(id: String, family: Family, goals: Vec<Goal>, split: Split) -> Task {
     let conditions = goals.iter().map(|&goal| goal.brings_about(family)).collect();
-    Task { id, family, goals, conditions, split }
+    Task { id, family, goals, conditions, split, blocks: None }
 }

@@ -28,7 +28,7 @@ impl TaskSet {
         self.tasks.iter().find(|task| task.id == id)
     }
 
-    /// Checks every rule: ids are unique, slots exist and are of the right kind, nothing is brought to itself or
+    /// Checks every rule: ids are unique, slots exist, are of the right kind and within reach, nothing is brought to itself or
     /// brought twice, towers grow from below, every condition is what a goal brings about, training tasks come first,
     /// and no unseen task asks for what a training task asks for.
     ///
@@ -90,6 +90,30 @@ pub enum TaskSetError {
         slot: String,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// A number of blocks that cannot be within reach.
+    #[error(
+        "tasks[{task}].blocks: is {blocks}; allowed in {} is {}",
+        family.name(),
+        if family.max_blocks().is_some() { "2 to 7, or none for all eight" } else { "none" }
+    )]
+    Blocks {
+        /// Which task.
+        task: usize,
+        /// The number.
+        blocks: u16,
+        /// The task's family.
+        family: Family,
+    },
+    /// A block that stands aside is to be moved, or built on.
+    #[error("{place}: {slot} stands aside, only the first {blocks} blocks are within reach")]
+    Aside {
+        /// Which goal.
+        place: String,
+        /// The slot's name.
+        slot: String,
+        /// How many blocks are within reach.
+        blocks: u16,
     },
     /// Something is to be brought to itself.
     #[error("{place}: {slot} is its own target")]

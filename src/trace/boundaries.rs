@@ -1,6 +1,6 @@
 //! A recorded episode without the frames between its boundaries.
 
-use crate::trace::{Actor, Episode, EpisodeParts, ProgramCall, Span, TraceError};
+use crate::trace::{Actor, Episode, EpisodeParts, ProgramCall, PushProblem, Span, TraceError};
 
 /// The boundary frames of a recorded episode, and where they stood in the recording.
 ///
@@ -34,6 +34,11 @@ impl Boundaries {
         let is_own_specification = parts.provenance.actor == Actor::Expert;
         for call in &mut parts.calls {
             move_spans(call, &recorded, is_own_specification)?;
+        }
+        for (number, push) in parts.pushes.iter_mut().enumerate() {
+            let off_boundary = PushProblem::OffBoundary { frame: push.frames.end.saturating_sub(1) };
+            let moved = recorded.span_around(push.frames);
+            push.frames = moved.ok_or(TraceError::Push { push: number, problem: off_boundary })?;
         }
         if is_own_specification && parts.specification_frames == recorded.count {
             parts.specification_frames = parts.frames.len() as u32;
@@ -69,5 +74,12 @@ impl RecordedFrames {
         let position = |frame: u32| self.positions.binary_search(&frame).ok();
         let (first, last) = (position(recorded.begin)?, position(recorded.end.checked_sub(1)?)?);
         Some(Span { begin: first as u32, end: last as u32 + 1 })
+    }
+
+    /// The same of a span that may begin between frames of the excerpt: from the one before on.
+    fn span_around(&self, recorded: Span) -> Option<Span> {
+        let first = self.positions.partition_point(|&position| position <= recorded.begin).checked_sub(1)?;
+        let last = self.positions.binary_search(&recorded.end.checked_sub(1)?).ok()?;
+        Span::new(first as u32, last as u32 + 1)
     }
 }

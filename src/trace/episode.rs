@@ -5,8 +5,8 @@ use std::ops::Deref;
 use crate::scene::Scene;
 use crate::seed::Seed;
 use crate::task::{Family, Split, Task, Trial};
-use crate::trace::rules::{check_calls, check_frames, check_slots};
-use crate::trace::{Frame, Outcome, ProgramCall, Span, TraceError};
+use crate::trace::rules::{check_calls, check_frames, check_pushes, check_slots};
+use crate::trace::{Frame, Outcome, ProgramCall, Push, Span, TraceError};
 
 /// Who acted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +63,8 @@ pub struct EpisodeParts {
     pub specification_frames: u32,
     /// In the order of calling; the first is the root.
     pub calls: Vec<ProgramCall>,
+    /// What an adversary did, in order; empty as well in a world without one.
+    pub pushes: Vec<Push>,
     /// How it ended.
     pub outcome: Outcome,
 }
@@ -87,10 +89,11 @@ impl Episode {
     /// The first rule that does not hold. A failed episode may leave calls unended: the last ones, on the path from
     /// the root to where it was broken off.
     pub fn new(parts: EpisodeParts) -> Result<Self, TraceError> {
-        let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, outcome } = &parts;
+        let EpisodeParts { provenance: _, scene, frames, specification_frames, calls, pushes, outcome } = &parts;
         check_slots(scene)?;
         check_frames(scene, frames)?;
         check_calls(scene.slots.len(), frames.len() as u32, *specification_frames, calls, *outcome)?;
+        check_pushes(scene.bodies.len(), frames, pushes)?;
         Ok(Self(parts))
     }
 
@@ -118,6 +121,7 @@ impl Episode {
         let position = |frame: u32| counts.get(frame as usize).map_or(0, |count| count - 1);
         let moved = |span: Span| Span { begin: position(span.begin), end: position(span.last()) + 1 };
         let own_specification = parts.provenance.actor == Actor::Expert;
+        parts.pushes.iter_mut().for_each(|push| push.frames = moved(push.frames));
         for call in &mut parts.calls {
             call.frames = moved(call.frames);
             if own_specification {

@@ -2,8 +2,8 @@
 
 use crate::geometry::Pose;
 use crate::program::Program;
-use crate::scene::{Scene, SlotIndex};
-use crate::trace::{CallId, Frame, Outcome, ProgramCall, Span};
+use crate::scene::{BodyIndex, Scene, SlotIndex};
+use crate::trace::{CallId, Frame, Outcome, ProgramCall, Push, Span};
 
 /// A rule of the trace that does not hold. `call` and `frame` count from 0.
 #[expect(missing_docs, reason = "the messages say what each field is")]
@@ -33,6 +33,24 @@ pub enum TraceError {
     Call { call: u32, problem: CallProblem },
     #[error("call {call}: frames {span:?} do not begin and end at boundary frames")]
     OffBoundary { call: u32, span: Span },
+    #[error("push {push}: {problem}")]
+    Push { push: usize, problem: PushProblem },
+}
+
+/// A rule of pushes that one breaks.
+#[expect(missing_docs, reason = "the messages say what each field is")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PushProblem {
+    #[error("its frames {found:?} are not two or more of the episode's {frames}")]
+    Frames { found: Span, frames: usize },
+    #[error("its last frame {frame} is not a boundary")]
+    OffBoundary { frame: u32 },
+    #[error("it begins at frame {begin}, before the push before has come to rest at frame {before}")]
+    Overlap { begin: u32, before: u32 },
+    #[error("it is of body {body}, but the scene has {bodies} bodies")]
+    Body { body: u16, bodies: usize },
+    #[error("its impulse is not finite")]
+    NotFinite,
 }
 
 /// A rule of the program tree that a call breaks.
@@ -123,6 +141,33 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
 fn is_finite(pose: &Pose) -> bool {
     let finite = |numbers: &[f32]| numbers.iter().fold(true, |all, number| all & number.is_finite());
     finite(pose.translation.vector.as_slice()) & finite(pose.rotation.coords.as_slice())
+}
+
+/// Pushes follow one another, each from a frame to a later boundary.
+pub(super) fn check_pushes(n_bodies: usize, frames: &[Frame], pushes: &[Push]) -> Result<(), TraceError> {
+    let mut before = 0;
+    for (number, push) in pushes.iter().enumerate() {
+        let problem = |problem| Err(TraceError::Push { push: number, problem });
+        let Push { frames: found, body, impulse_ns, toppled } = push;
+        let has_two = found.begin.checked_add(2).is_some_and(|least| least <= found.end);
+        let Some(last) = frames.get(found.end.saturating_sub(1) as usize).filter(|_| has_two) else {
+            return problem(PushProblem::Frames { found: *found, frames: frames.len() });
+        };
+        if !last.boundary {
+            return problem(PushProblem::OffBoundary { frame: found.last() });
+        }
+        if found.begin < before {
+            return problem(PushProblem::Overlap { begin: found.begin, before });
+        }
+        if let Some(&BodyIndex(body)) = [body].into_iter().chain(toppled).find(|body| usize::from(body.0) >= n_bodies) {
+            return problem(PushProblem::Body { body, bodies: n_bodies });
+        }
+        if !impulse_ns.iter().all(|part| part.is_finite()) {
+            return problem(PushProblem::NotFinite);
+        }
+        before = found.last();
+    }
+    Ok(())
 }
 
 /// Holds every rule of the program tree, for calls among `n_frames` frames whose arguments are among `n_slots` slots.

@@ -26,8 +26,6 @@ const SPLIT_FRAMES: usize = 192;
 pub struct Group {
     /// Each once; none where observations are read.
     pub pictures: Pictures,
-    /// The observation row of each picture, for a detector to learn from.
-    pub rows: Vec<f32>,
     /// Their decisions.
     pub parts: Vec<Part>,
 }

@@ -3,31 +3,34 @@
 //! # Input and output
 //!
 //! Under the model's folder: `checkpoint/step-NNNNNNNN.safetensors` (weights), `….adam` (the optimizer's moments) and
-//! `checkpoint/latest.json`, which is written last and names the two with their hashes. It alone says what counts.
+//! `checkpoint/latest.json`, which is written last and names the two with their hashes. It alone says what counts. A
+//! detector, which learns first, has its own in `checkpoint/detector/`.
 
 use std::path::{Path, PathBuf};
 
+use burn::module::Module;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::{self, IoError, sha256_bytes};
-use crate::model::{ModelConfig, Network, weights_from_bytes, weights_to_bytes};
+use crate::model::{ModelConfig, weights_from_bytes, weights_to_bytes};
 use crate::training::TrainError;
 use crate::training::curriculum::LevelErrors;
 use crate::training::learner::Learner;
 use crate::training::metrics::Metric;
 
+/// Under the model's folder.
+const FOLDER: &str = "checkpoint";
+
 /// `latest.json`.
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Latest {
+#[serde(deny_unknown_fields, bound = "S: Stands")]
+struct Latest<S> {
     /// What is trained, and how; a checkpoint of anything else is not taken.
     model: ModelConfig,
     /// Hash of the dataset.
     dataset: String,
-    step: u32,
-    examples: u64,
-    errors: Vec<f32>,
-    metrics: Vec<Metric>,
+    standing: S,
     weights: Part,
     optimizer: Part,
 }
@@ -41,7 +44,14 @@ struct Part {
 }
 
 /// What a training is beyond its weights.
-#[derive(Clone, Debug, PartialEq)]
+pub(crate) trait Stands: Serialize + DeserializeOwned + Clone {
+    /// Steps done.
+    fn step(&self) -> u32;
+}
+
+/// What the training of a network is beyond its weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Standing {
     /// Steps done.
     pub(crate) step: u32,
@@ -49,6 +59,12 @@ pub(crate) struct Standing {
     pub(crate) examples: u64,
     pub(crate) errors: LevelErrors,
     pub(crate) metrics: Vec<Metric>,
+}
+
+impl Stands for Standing {
+    fn step(&self) -> u32 {
+        self.step
+    }
 }
 
 /// The checkpoints of one training.
@@ -60,13 +76,22 @@ pub(crate) struct Checkpoints<'c> {
 
 impl<'c> Checkpoints<'c> {
     pub(crate) fn new(folder: &Path, model: &'c ModelConfig, dataset: String) -> Self {
-        Self { folder: folder.join("checkpoint"), model, dataset }
+        Self { folder: folder.join(FOLDER), model, dataset }
+    }
+
+    /// Those of the detector that is trained before the network.
+    pub(crate) fn of_detector(folder: &Path, model: &'c ModelConfig, dataset: String) -> Self {
+        Self { folder: folder.join(FOLDER).join("detector"), model, dataset }
     }
 
     /// Saves, and then removes the checkpoint before.
-    pub(crate) fn save<N: Network>(&self, learner: &Learner<N>, standing: &Standing) -> Result<(), TrainError> {
-        let before = self.latest()?;
-        let stem = format!("step-{:08}", standing.step);
+    pub(crate) fn save<M: Module + Sync, S: Stands>(
+        &self,
+        learner: &Learner<M>,
+        standing: &S,
+    ) -> Result<(), TrainError> {
+        let before = self.latest::<S>()?;
+        let stem = format!("step-{:08}", standing.step());
         let path = self.folder.join(&stem);
         let optimizer = learner
             .optimizer_bytes()
@@ -74,15 +99,12 @@ impl<'c> Checkpoints<'c> {
         let latest = Latest {
             model: self.model.clone(),
             dataset: self.dataset.clone(),
-            step: standing.step,
-            examples: standing.examples,
-            errors: standing.errors.0.clone(),
-            metrics: standing.metrics.clone(),
-            weights: self.write(format!("{stem}.safetensors"), &weights_to_bytes(learner.network(), &path)?)?,
+            standing: standing.clone(),
+            weights: self.write(format!("{stem}.safetensors"), &weights_to_bytes(learner.module(), &path)?)?,
             optimizer: self.write(format!("{stem}.adam"), &optimizer)?,
         };
         artifact::write_json(&self.latest_path(), &latest)?;
-        if let Some(before) = before.filter(|before| before.step != standing.step) {
+        if let Some(before) = before.filter(|before| before.standing.step() != standing.step()) {
             for part in [before.weights, before.optimizer] {
                 remove(&self.folder.join(part.file))?;
             }
@@ -91,21 +113,23 @@ impl<'c> Checkpoints<'c> {
     }
 
     /// Goes on where a checkpoint of the same training stands; nothing when there is none.
-    pub(crate) fn resume<N: Network>(&self, learner: Learner<N>) -> Result<Result<Resumed<N>, Learner<N>>, TrainError> {
+    pub(crate) fn resume<M: Module + Sync, S: Stands>(
+        &self,
+        learner: Learner<M>,
+    ) -> Result<Result<Resumed<M, S>, Learner<M>>, TrainError> {
         let Some(latest) =
-            self.latest()?.filter(|latest| latest.model == *self.model && latest.dataset == self.dataset)
+            self.latest::<S>()?.filter(|latest| latest.model == *self.model && latest.dataset == self.dataset)
         else {
             return Ok(Err(learner));
         };
         let path = self.folder.join(&latest.weights.file);
-        let network = weights_from_bytes(learner.network().clone(), self.read(&latest.weights)?, &path)?;
+        let module = weights_from_bytes(learner.module().clone(), self.read(&latest.weights)?, &path)?;
         let path = self.folder.join(&latest.optimizer.file);
         let learner = learner
-            .with_network(network)
+            .with_module(module)
             .with_optimizer(self.read(&latest.optimizer)?)
             .map_err(|problem| TrainError::Checkpoint { problem, path })?;
-        let Latest { step, examples, errors, metrics, .. } = latest;
-        Ok(Ok(Resumed { learner, standing: Standing { step, examples, errors: LevelErrors(errors), metrics } }))
+        Ok(Ok(Resumed { learner, standing: latest.standing }))
     }
 
     /// Removes what is left once the model itself is written.
@@ -122,7 +146,7 @@ impl<'c> Checkpoints<'c> {
         self.folder.join("latest.json")
     }
 
-    fn latest(&self) -> Result<Option<Latest>, IoError> {
+    fn latest<S: Stands>(&self) -> Result<Option<Latest<S>>, IoError> {
         match artifact::read_json(&self.latest_path()) {
             Ok(latest) => Ok(Some(latest)),
             Err(IoError::System { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -148,9 +172,9 @@ impl<'c> Checkpoints<'c> {
 }
 
 /// A training that goes on.
-pub(crate) struct Resumed<N> {
-    pub(crate) learner: Learner<N>,
-    pub(crate) standing: Standing,
+pub(crate) struct Resumed<M, S> {
+    pub(crate) learner: Learner<M>,
+    pub(crate) standing: S,
 }
 
 fn remove(path: &Path) -> Result<(), IoError> {

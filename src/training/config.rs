@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{Architecture, EncoderKind, Variant};
 use crate::trace::SpecificationForm;
 use crate::training::TrainError;
+use crate::training::detector_config::DetectorTraining;
 
 /// What is trained, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +33,23 @@ impl Training {
         let refuse = |key, found, allowed| Err(TrainError::Config { key, found, allowed });
         if self.variant.sees() && self.config.curriculum != Curriculum::Equal {
             return refuse("curriculum", "adaptive".to_owned(), "equal with variants that see");
+        }
+        if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
+            return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
+        }
+        let has_colours = matches!(self.variant.encoder(), EncoderKind::ColourSlots | EncoderKind::Detected);
+        match self.config.colours {
+            Some(colours) if !has_colours => {
+                return refuse(
+                    "colours",
+                    format!("{colours} for variant {}", self.variant),
+                    "variants on colour slots",
+                );
+            }
+            Some(colours) if !(2..=64).contains(&colours) => {
+                return refuse("colours", colours.to_string(), "2 to 64");
+            }
+            Some(_) | None => {}
         }
         if self.variant.sees() != (self.specification == SpecificationForm::Video) {
             let found = format!("{} with variant {}", self.specification, self.variant);
@@ -61,8 +79,9 @@ impl Training {
             EncoderKind::ObjectCentric => (1000, 0.003, 0.0, 0.2, 0.25),
             EncoderKind::Flattened => (3000, 0.002, 1.0, 0.0, 0.0),
             EncoderKind::ColourSlots => (2000, 0.003, 0.0, 0.0, 0.0),
+            EncoderKind::Keypoints => (3000, 0.002, 0.0, 0.0, 0.0),
             EncoderKind::Convolved | EncoderKind::DetectedFlattened => (3000, 0.001, 0.0, 0.0, 0.0),
-            EncoderKind::Detected => (2000, 0.003, 0.0, 0.0, 0.0),
+            EncoderKind::Detected => (2000, 0.003, 0.0, 0.2, 0.25),
         };
         // What a task does to which slot stands in the weights of a model without a specification.
         let relabel_slots = if self.variant.architecture() == Architecture::Npi { 0.0 } else { relabel_slots };
@@ -72,6 +91,7 @@ impl Training {
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
             gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
             recovery_states: self.config.recovery_states.or(Some(recovery_states)),
+            detector: self.config.detector.resolved(self.variant),
             ..self.config.clone()
         };
         Self { config, ..self.clone() }
@@ -116,6 +136,13 @@ pub struct TrainConfig {
     /// How often whatever goes into one container goes into another (0 to 1), so that several categories share one as
     /// in mappings that no training task shows. Off by default; for Object Sorting.
     pub merge_containers: f32,
+    /// How many colours are told apart by networks on colour slots: one for each thing to be seen, one for the gripper, and
+    /// some for letters, shadows and darker sides. By default three more than there are slots and a gripper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub colours: Option<u32>,
+    /// How a detector is trained before the network behind it; for variants that have one.
+    #[serde(skip_serializing_if = "DetectorTraining::is_default")]
+    pub detector: DetectorTraining,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -139,6 +166,8 @@ impl Default for TrainConfig {
             scatter_bystanders: 0.0,
             recovery_states: None,
             merge_containers: 0.0,
+            colours: None,
+            detector: DetectorTraining::default(),
             checkpoint_every: 100,
             metrics_every: 10,
         }
@@ -195,6 +224,7 @@ impl TrainConfig {
     /// [`TrainError::Config`] for the first that does not, with what is allowed.
     pub fn check(&self) -> Result<(), TrainError> {
         let Self { pairing: _, curriculum: _, warmup_steps: _, loss, .. } = self;
+        self.detector.check()?;
         let at_least_one = [
             ("steps", self.steps.unwrap_or(1)),
             ("batch", self.batch),
@@ -237,13 +267,27 @@ impl TrainConfig {
         self.steps.unwrap_or_default()
     }
 
+    /// Steps of detector and network together.
+    pub fn n_steps_in_all(&self) -> u32 {
+        self.detector.n_steps() + self.n_steps()
+    }
+
     /// The learning rate of a step: a straight rise, then a cosine. Zero where none is set or filled in.
     pub fn learning_rate_at(&self, step: u32) -> f64 {
-        let highest = f64::from(self.learning_rate.unwrap_or_default());
+        self.annealed(f64::from(self.learning_rate.unwrap_or_default()), step, self.n_steps())
+    }
+
+    /// The same for a step of the detector.
+    pub(super) fn detector_learning_rate_at(&self, step: u32) -> f64 {
+        let highest = f64::from(self.detector.learning_rate.unwrap_or_default());
+        self.annealed(highest, step, self.detector.n_steps())
+    }
+
+    fn annealed(&self, highest: f64, step: u32, n_steps: u32) -> f64 {
         if step < self.warmup_steps {
             return highest * f64::from(step + 1) / f64::from(self.warmup_steps);
         }
-        let span = self.n_steps().saturating_sub(self.warmup_steps).max(1);
+        let span = n_steps.saturating_sub(self.warmup_steps).max(1);
         let done = f64::from(step - self.warmup_steps) / f64::from(span);
         let last = f64::from(self.final_learning_rate);
         highest * (last + (1.0 - last) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos()))

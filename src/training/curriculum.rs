@@ -6,6 +6,7 @@
 //! with respect to the corresponding program".
 
 use rand::Rng as _;
+use serde::{Deserialize, Serialize};
 
 use crate::seed::Seed;
 use crate::training::config::Curriculum;
@@ -16,7 +17,7 @@ const FOLLOW: f32 = 0.1;
 const LEAST_ERROR: f32 = 0.01;
 
 /// The errors of all levels, as far as they are known.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LevelErrors(pub(crate) Vec<f32>);
 
 impl LevelErrors {

@@ -180,12 +180,6 @@ impl<'d> Examples<'d> {
         }
     }
 
-    /// What was observed in a frame of a trial.
-    pub(super) fn observation_row(&self, trial: usize, frame: usize) -> &[f32] {
-        let width = Observation::width(self.data.n_slots);
-        &self.data.trials[trial].observations[frame * width..][..width]
-    }
-
     /// The dataset behind.
     pub fn data(&self) -> &'d DatasetTrials {
         self.data

@@ -8,7 +8,7 @@
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
 use burn::tensor::activation::{log_softmax, relu};
-use burn::tensor::{Bytes, Tensor, TensorData};
+use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use crate::model::Network;
@@ -50,29 +50,34 @@ impl Losses {
     }
 }
 
-/// A network with its optimizer.
-pub struct Learner<N> {
-    network: N,
+/// A module with its optimizer.
+pub struct Learner<M> {
+    module: M,
+    device: Device,
     optimizer: ModuleOptimizer,
-    weights: LossWeights,
     clip_norm: f32,
 }
 
-impl<N: Network> Learner<N> {
-    /// Begins with a network on a device with gradients.
-    pub fn new(network: N, weights: LossWeights, clip_norm: f32) -> Self {
-        Self { network, optimizer: AdamConfig::new().with_epsilon(1e-8).init(), weights, clip_norm }
+impl<M: Module + Sync> Learner<M> {
+    /// Begins with a module on a device with gradients.
+    pub fn new(module: M, device: Device, clip_norm: f32) -> Self {
+        Self { module, device, optimizer: AdamConfig::new().with_epsilon(1e-8).init(), clip_norm }
     }
 
-    /// The network as it is now.
-    pub fn network(&self) -> &N {
-        &self.network
+    /// The module as it is now.
+    pub fn module(&self) -> &M {
+        &self.module
     }
 
     /// The same with other parameters.
     #[must_use]
-    pub fn with_network(self, network: N) -> Self {
-        Self { network, ..self }
+    pub fn with_module(self, module: M) -> Self {
+        Self { module, ..self }
+    }
+
+    /// The module alone, when there is nothing more to learn.
+    pub fn into_module(self) -> M {
+        self.module
     }
 
     /// The optimizer's moments, to go on with later.
@@ -94,24 +99,53 @@ impl<N: Network> Learner<N> {
         Ok(Self { optimizer, ..self })
     }
 
-    /// Learns from groups; the losses of their parts, in the same order.
+    /// Learns from groups. `lose` says what a module loses on a group, and what is to be differentiated; the former comes
+    /// back in the groups' order.
     #[must_use]
-    pub fn step(self, groups: &[Group], learning_rate: f64) -> (Self, Vec<Losses>) {
-        let device = self.network.device();
-        let copies: Vec<(N, &Group)> = groups.iter().map(|group| (self.network.clone().fork(&device), group)).collect();
-        let weights = self.weights;
-        let results: Vec<(Vec<Losses>, Vec<f32>)> =
-            copies.par_iter().map(|(network, group)| gradient(network, group, weights)).collect();
+    pub fn step<G: Sync, L: Send>(
+        self,
+        groups: &[G],
+        learning_rate: f64,
+        lose: impl Fn(&M, &G) -> (L, Option<Tensor<1>>) + Sync,
+    ) -> (Self, Vec<L>) {
+        let copies: Vec<(M, &G)> = groups.iter().map(|group| (self.module.clone().fork(&self.device), group)).collect();
+        let results: Vec<(L, Vec<f32>)> = copies
+            .par_iter()
+            .map(|(module, group)| {
+                let (losses, total) = lose(module, group);
+                (losses, gradient(module, total))
+            })
+            .collect();
         let mut sum = vec![0.0_f32; results.first().map_or(0, |(_, gradient)| gradient.len())];
         for (_, gradient) in &results {
             sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
         }
         clip(&mut sum, self.clip_norm);
-        let gradients = from_flat(&self.network, &sum);
-        let Self { network, mut optimizer, weights, clip_norm } = self;
-        let network = optimizer.step(learning_rate, network, gradients);
-        (Self { network, optimizer, weights, clip_norm }, results.into_iter().flat_map(|(losses, _)| losses).collect())
+        let gradients = from_flat(&self.module, &sum);
+        let Self { module, device, mut optimizer, clip_norm } = self;
+        let module = optimizer.step(learning_rate, module, gradients);
+        (Self { module, device, optimizer, clip_norm }, results.into_iter().map(|(losses, _)| losses).collect())
     }
+}
+
+/// The gradient of a loss in the order of the module's parameters.
+fn gradient<M: Module>(module: &M, total: Option<Tensor<1>>) -> Vec<f32> {
+    let gradients = total.map(|total| GradientsParams::from_grads(total.backward(), module)).unwrap_or_default();
+    let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
+    module.visit(&mut flat);
+    flat.flat
+}
+
+/// Losses of a group's parts, and their sum.
+pub(super) fn group_losses<N: Network>(
+    network: &N,
+    group: &Group,
+    weights: LossWeights,
+) -> (Vec<Losses>, Option<Tensor<1>>) {
+    let percepts = network.perceive(&group.pictures);
+    let parts = group.parts.iter().map(|part| losses(network, part, &percepts, weights));
+    let (losses, totals): (Vec<Losses>, Vec<Tensor<1>>) = parts.unzip();
+    (losses, totals.into_iter().reduce(|sum, total| sum + total))
 }
 
 /// Scales a gradient down to a norm that it exceeds. One that is not finite is dropped whole.
@@ -121,19 +155,6 @@ fn clip(gradient: &mut [f32], largest_norm: f32) {
     if scale < 1.0 {
         gradient.iter_mut().for_each(|value| *value = if value.is_finite() { *value * scale } else { 0.0 });
     }
-}
-
-/// Losses of a group's parts, and the gradient of their sum in the order of the network's parameters.
-fn gradient<N: Network>(network: &N, group: &Group, weights: LossWeights) -> (Vec<Losses>, Vec<f32>) {
-    let percepts = network.perceive(&group.pictures);
-    let parts = group.parts.iter().map(|part| losses(network, part, &percepts, weights));
-    let (losses, totals): (Vec<Losses>, Vec<Tensor<1>>) = parts.unzip();
-    let detection = network.detection_loss(&group.pictures, &group.rows);
-    let total = totals.into_iter().chain(detection).reduce(|sum, total| sum + total);
-    let gradients = total.map(|total| GradientsParams::from_grads(total.backward(), network)).unwrap_or_default();
-    let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
-    network.visit(&mut flat);
-    (losses, flat.flat)
 }
 
 /// Losses of a part, and the weighed sum to differentiate. `percepts` are those of its group's pictures.

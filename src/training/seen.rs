@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use rand::Rng;
 
+use crate::dataset::DatasetTrials;
 use crate::model::{PictureSample, Pictures};
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
@@ -36,6 +37,29 @@ pub trait Gallery: Sync {
     ///
     /// When one cannot be read; says which and why.
     fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String>;
+
+    /// Told which trials the next step will look at, so that their pictures can be made ready meanwhile.
+    fn announce(&self, trials: &[usize]) {
+        let _nothing_to_do = trials;
+    }
+}
+
+/// The trials that a step with this seed looks at, each once.
+pub(super) fn trials(examples: &Examples<'_>, seed: Seed) -> Vec<usize> {
+    let groups = (0..GROUPS).flat_map(|group| draw_pairs(examples, &mut group_seed(seed, group).rng()));
+    let mut trials: Vec<usize> = groups.flatten().collect();
+    trials.sort_unstable();
+    trials.dedup();
+    trials
+}
+
+fn group_seed(seed: Seed, group: usize) -> Seed {
+    seed.derive("group", &[group as u64])
+}
+
+/// The first that is drawn for a group: whatever else is, these are the trials that it looks at.
+fn draw_pairs(examples: &Examples<'_>, rng: &mut impl Rng) -> Vec<[usize; 2]> {
+    (0..TASKS_OF_GROUP).map(|_| examples.draw_pair(rng)).collect()
 }
 
 /// Draws a step's mini-batches, one of each of `levels`. It depends on nothing but its arguments.
@@ -46,9 +70,8 @@ pub(super) fn draw_seen(
     sizes: &[(usize, usize)],
     seed: Seed,
 ) -> Result<Vec<Group>, TrainError> {
-    let mut drawn: Vec<Vec<Vec<Example>>> = (0..GROUPS)
-        .map(|group| draw_group(examples, config, sizes, &mut seed.derive("group", &[group as u64]).rng()))
-        .collect();
+    let mut drawn: Vec<Vec<Vec<Example>>> =
+        (0..GROUPS).map(|group| draw_group(examples, config, sizes, &mut group_seed(seed, group).rng())).collect();
     let mut groups: Vec<Shown> = drawn.iter().map(|group| Shown::new(group.iter().flatten())).collect();
     let mut parts: Vec<Group> =
         groups.iter_mut().map(|shown| shown.group(examples, gallery)).collect::<Result<_, _>>()?;
@@ -78,7 +101,7 @@ fn draw_group(
     sizes: &[(usize, usize)],
     rng: &mut impl Rng,
 ) -> Vec<Vec<Example>> {
-    let pairs: Vec<[usize; 2]> = (0..TASKS_OF_GROUP).map(|_| examples.draw_pair(rng)).collect();
+    let pairs = draw_pairs(examples, rng);
     let decision = |level_idx: usize, rng: &mut _| {
         (0..DRAWS).find_map(|_| {
             let [a, b] = pairs[Rng::random_range(rng, 0..pairs.len())];
@@ -117,10 +140,9 @@ impl Shown {
         let mut by_trial: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         self.numbers.keys().for_each(|&(trial, frame)| by_trial.entry(trial).or_default().push(frame));
         for (trial, frames) in by_trial {
-            fetch(examples, gallery, trial, &frames, &mut pictures)?;
+            fetch(examples.data(), gallery, trial, &frames, &mut pictures)?;
         }
-        let rows = self.numbers.keys().flat_map(|&(trial, frame)| examples.observation_row(trial, frame)).copied();
-        Ok(Group { pictures, rows: rows.collect(), parts: Vec::new() })
+        Ok(Group { pictures, parts: Vec::new() })
     }
 
     fn number(&self, trial: usize, frame: usize) -> f32 {
@@ -139,29 +161,30 @@ impl Shown {
     }
 }
 
-/// Pictures of trials from all over the dataset.
-pub(super) fn sample(examples: &Examples<'_>, gallery: &dyn Gallery) -> Result<PictureSample, TrainError> {
-    let trials = &examples.data().trials;
-    let every = trials.len().div_ceil(SAMPLE_TRIALS).max(1);
+/// Pictures of trials from all over the dataset, and which trials these are.
+pub(super) fn sample(data: &DatasetTrials, gallery: &dyn Gallery) -> Result<(PictureSample, Vec<usize>), TrainError> {
+    let every = data.trials.len().div_ceil(SAMPLE_TRIALS).max(1);
+    let sampled: Vec<usize> = (0..data.trials.len()).step_by(every).collect();
     let (width, height) = gallery.size();
     let mut sample = PictureSample { pictures: Pictures::of_size(width, height), lengths: Vec::new() };
-    for (trial, of) in trials.iter().enumerate().step_by(every) {
-        let frames: Vec<usize> = (0..of.n_frames).collect();
-        fetch(examples, gallery, trial, &frames, &mut sample.pictures)?;
+    for &trial in &sampled {
+        let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
+        fetch(data, gallery, trial, &frames, &mut sample.pictures)?;
         sample.lengths.push(frames.len());
     }
-    Ok(sample)
+    Ok((sample, sampled))
 }
 
-fn fetch(
-    examples: &Examples<'_>,
+/// Adds pictures of a trial's frames; an error says of which trial.
+pub(super) fn fetch(
+    data: &DatasetTrials,
     gallery: &dyn Gallery,
     trial: usize,
     frames: &[usize],
     into: &mut Pictures,
 ) -> Result<(), TrainError> {
     gallery.fetch(trial, frames, into).map_err(|problem| {
-        let of = &examples.data().trials[trial];
+        let of = &data.trials[trial];
         TrainError::Trial { task: of.task_id.clone(), trial: of.trial, problem }
     })
 }

@@ -28,6 +28,9 @@ pub enum VideoError {
     /// Bytes are left over or missing.
     #[error("a packet holds no picture that can be shown by itself")]
     NoPicture,
+    /// A camera is turned away, or stands in something.
+    #[error("none of the things in the scene is in any of its pictures")]
+    SeesNothing,
     /// The container is not what it should be.
     #[error("{message}: {}", path.display())]
     Container {

@@ -15,6 +15,8 @@ pub struct Film {
     /// For videos; a fresh one for each episode.
     encoder: Option<H264Encoder>,
     bytes: Vec<u8>,
+    /// Whether a body was in one of the episode's pictures.
+    has_seen_a_body: bool,
 }
 
 /// What is claimed of the rate while encoding; recorded frames carry their own times.
@@ -27,7 +29,7 @@ impl Film {
         let camera = config.camera(Family::BlockStacking, seed);
         let nothing = Scene { bodies: Vec::new(), slots: Vec::new(), table_half_m: [0.0; 2] };
         let renderer = Renderer::new(config.look(&nothing, seed));
-        Self { config: config.clone(), camera, renderer, encoder: None, bytes: Vec::new() }
+        Self { config: config.clone(), camera, renderer, encoder: None, bytes: Vec::new(), has_seen_a_body: false }
     }
 
     /// Its settings.
@@ -47,6 +49,7 @@ impl Film {
     /// When the encoder cannot be made.
     pub fn begin(&mut self, family: Family, scene: &Scene, seed: Seed) -> Result<(), VideoError> {
         self.camera = self.config.camera(family, seed);
+        self.has_seen_a_body = false;
         self.renderer.set_look(self.config.look(scene, seed));
         self.encoder = match self.config.format {
             PictureFormat::Png => None,
@@ -66,7 +69,18 @@ impl Film {
 
     /// Draws what the camera sees, without encoding it.
     pub fn draw(&mut self, scene: &Scene, state: &SceneState) -> &Picture {
-        self.renderer.draw(scene, state, &self.camera)
+        let picture = self.renderer.draw(scene, state, &self.camera);
+        self.has_seen_a_body = self.has_seen_a_body || picture.shows_a_body();
+        picture
+    }
+
+    /// Makes sure that the camera has seen something since the episode began: a body, at whatever time.
+    ///
+    /// # Errors
+    ///
+    /// [`VideoError::SeesNothing`]
+    pub fn check_sight(&self) -> Result<(), VideoError> {
+        if self.has_seen_a_body { Ok(()) } else { Err(VideoError::SeesNothing) }
     }
 
     /// Films a frame: PNG, or a packet of H.264 in Annex B. `is_key` says that it must be shown without those before.
@@ -76,6 +90,7 @@ impl Film {
     /// When the encoder fails.
     pub fn frame(&mut self, scene: &Scene, state: &SceneState, is_key: bool) -> Result<&[u8], VideoError> {
         let picture = self.renderer.draw(scene, state, &self.camera);
+        self.has_seen_a_body = self.has_seen_a_body || picture.shows_a_body();
         self.bytes.clear();
         match &mut self.encoder {
             None => encode_png(&picture.rgb, [picture.width, picture.height], &mut self.bytes)?,

@@ -79,7 +79,8 @@ pub struct Mp4Sample {
     pub seconds: f64,
     /// Whether it can be shown without those before.
     pub is_key: bool,
-    offset: u64,
+    /// Where in the file its bytes begin.
+    pub offset: u64,
     len: u64,
 }
 
@@ -89,7 +90,7 @@ pub struct Mp4Reader {
     file: File,
     samples: Vec<Mp4Sample>,
     size_px: [u32; 2],
-    /// In Annex B, before each key frame that does not bring them.
+    /// In Annex B, before each key frame.
     parameter_sets: Vec<u8>,
 }
 
@@ -138,6 +139,17 @@ impl Mp4Reader {
         &self.samples
     }
 
+    /// One of them.
+    ///
+    /// # Errors
+    ///
+    /// When there are not so many.
+    pub fn sample(&self, position: usize) -> Result<Mp4Sample, VideoError> {
+        let count = self.samples.len();
+        let sample = self.samples.get(position);
+        sample.copied().ok_or_else(|| container(&self.path, &format!("no picture {position} of {count}")))
+    }
+
     /// Width and height of the pictures.
     pub fn size_px(&self) -> [u32; 2] {
         self.size_px
@@ -154,35 +166,30 @@ impl Mp4Reader {
     ///
     /// When there is no such sample, or it is damaged.
     pub fn read(&mut self, position: usize, packet: &mut Vec<u8>) -> Result<(), VideoError> {
-        let count = self.samples.len();
-        let sample = self.samples.get(position);
-        let sample = *sample.ok_or_else(|| container(&self.path, &format!("no picture {position} of {count}")))?;
+        let sample = self.sample(position)?;
         let mut bytes = vec![0; sample.len as usize];
         let io = |action| IoError::system(action, &self.path);
         self.file.seek(SeekFrom::Start(sample.offset)).map_err(io("read"))?;
         self.file.read_exact(&mut bytes).map_err(io("read"))?;
         packet.clear();
-        let mut has_sets = false;
+        // Some writers keep them in the pictures too.
+        let has_sets = bytes.get(4).is_some_and(|header| header & 0x1f == PARAMETER_SET);
+        if sample.is_key && !has_sets {
+            packet.extend_from_slice(&self.parameter_sets);
+        }
         let mut rest = bytes.as_slice();
         while let Some((length, behind)) = rest.split_first_chunk::<4>() {
             let unit = behind.get(..u32::from_be_bytes(*length) as usize);
             let unit = unit.ok_or_else(|| container(&self.path, &format!("picture {position} is cut off")))?;
-            has_sets |= unit.first().is_some_and(|head| head & UNIT_KIND == PARAMETER_SET);
             packet.extend_from_slice(&START_CODE);
             packet.extend_from_slice(unit);
             rest = &behind[unit.len()..];
-        }
-        // Muxers keep them in the samples or take them out: a packet has them once, so that copies stay the same.
-        if sample.is_key && !has_sets {
-            packet.splice(0..0, self.parameter_sets.iter().copied());
         }
         Ok(())
     }
 }
 
+/// The kind of unit that is a sequence's parameter set.
+const PARAMETER_SET: u8 = 7;
 /// Before each unit of Annex B.
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
-/// The bits of a unit's first byte that say what it is.
-const UNIT_KIND: u8 = 0x1f;
-/// A sequence parameter set.
-const PARAMETER_SET: u8 = 7;

@@ -8,7 +8,7 @@ use rerun::external::re_sdk_types::blueprint::components::BackgroundKind;
 
 use crate::visualize::layout::{Layout, Node};
 use crate::visualize::store::Store;
-use crate::visualize::{Replay, VisualizeError, agreement, clock, palette, series, specification};
+use crate::visualize::{Replay, VisualizeError, agreement, clock, palette, pictures, series, specification};
 
 /// The blueprint for some replays: one for all, since Rerun has one an application.
 pub(super) fn blueprint(replays: &[Replay<'_>]) -> Result<Store, VisualizeError> {
@@ -38,13 +38,19 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     put_camera(layout, scene, replays)?;
     let front = layout.view("2D", "Camera in front", "camera/front", &["/camera/front"])?;
     let wrist = layout.view("2D", "Camera on the gripper", "camera/wrist", &["/camera/wrist"])?;
-    let cameras = layout.split(ContainerKind::Vertical, &[front, wrist], &[0.5, 0.5])?;
+    let mut cameras = filmed(layout, replays)?;
+    cameras.extend([front, wrist]);
+    let shares = vec![1.0; cameras.len()];
+    let cameras = layout.split(ContainerKind::Vertical, &cameras, &shares)?;
     let scene = layout.split(ContainerKind::Horizontal, &[scene, cameras], &[0.68, 0.32])?;
     let paired = replays.iter().any(|replay| replay.demonstration.is_some());
     let (name, contents): (&str, &[&str]) = if paired {
-        ("Running programs, and those of the demonstration", &["/agreement", "/programs/**", "/programs_of_expert/**"])
+        (
+            "Running programs, and those of the demonstration",
+            &["/agreement", "/adversary", "/programs/**", "/programs_of_expert/**"],
+        )
     } else {
-        ("Running programs", &["/programs/**"])
+        ("Running programs", &["/adversary", "/programs/**"])
     };
     let lanes = layout.view("StateTimeline", name, "", contents)?;
     let name = if has_predictions(replays) {
@@ -56,6 +62,26 @@ fn left(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeEr
     put_strip_bounds(layout, scope, replays)?;
     let shares = if paired { [0.34, 0.49, 0.17] } else { [0.56, 0.24, 0.2] };
     layout.split(ContainerKind::Vertical, &[scene, lanes, scope], &shares)
+}
+
+/// What the recordings' own cameras saw, if there were any: one above the other, or several in one place.
+fn filmed(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Vec<Node>, VisualizeError> {
+    let mut known: Vec<String> = Vec::new();
+    let mut views = Vec::new();
+    for replay in replays {
+        for (at, camera) in replay.cameras.iter().enumerate() {
+            let entity = pictures::entity(camera);
+            if !known.contains(&entity) {
+                let title = pictures::title(replay, at, camera);
+                views.push(layout.view("2D", &title, &entity, &[&format!("/{entity}")])?);
+                known.push(entity);
+            }
+        }
+    }
+    match views.len() {
+        0 | 1 => Ok(views),
+        _ => Ok(vec![layout.split(ContainerKind::Tabs, &views, &[])?]),
+    }
 }
 
 /// Words, then numbers: probabilities where there are any.

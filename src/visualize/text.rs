@@ -19,12 +19,16 @@ pub(super) fn recording_id(replay: &Replay<'_>) -> String {
     for episode in [Some(replay.episode), replay.demonstration].into_iter().flatten() {
         hash(&mut hasher, episode);
     }
+    for camera in replay.cameras {
+        hasher.update(format!("{camera:?}"));
+    }
     let digest = hex(&hasher.finalize()[..6]);
     format!("{}-ep-{:06}-{digest}", replay.episode.provenance.task_id, replay.episode.provenance.index)
 }
 
 fn hash(hasher: &mut Sha256, episode: &Episode) {
     hasher.update(format!("{:?}{:?}{:?}", episode.provenance, episode.outcome, episode.calls));
+    hasher.update(format!("{:?}", episode.pushes));
     for frame in &episode.frames {
         hasher.update(frame.time_nanos.to_le_bytes());
         for pose in frame.state.bodies_in_world.iter().chain([&frame.state.gripper_in_world]) {
@@ -74,7 +78,18 @@ fn facts(replay: &Replay<'_>) -> Vec<(&'static str, String)> {
         ("episode", provenance.index.to_string()),
     ];
     facts.extend(divergence);
+    facts.extend(pushes_in_words(episode).map(|words| ("adversary", words)));
     facts
+}
+
+/// `2 pushes, 3 bodies toppled`; nothing without a push.
+fn pushes_in_words(episode: &Episode) -> Option<String> {
+    let n_toppled: usize = episode.pushes.iter().map(|push| push.toppled.len()).sum();
+    let plural = |count: usize, one: &str, several: &str| format!("{count} {}", if count == 1 { one } else { several });
+    let told = || {
+        format!("{}, {} toppled", plural(episode.pushes.len(), "push", "pushes"), plural(n_toppled, "body", "bodies"))
+    };
+    (!episode.pushes.is_empty()).then(told)
 }
 
 /// What, and when.
@@ -107,6 +122,9 @@ fn markdown(replay: &Replay<'_>) -> String {
         episode.calls.len(),
         duration_secs(episode)
     );
+    if let Some(words) = pushes_in_words(episode) {
+        let _written = write!(page, "\nadversary: {words}\n");
+    }
     if let Some(divergence) = replay.divergence {
         let _written = write!(page, "\n**{}**\n", divergence_in_words(episode, divergence));
     }

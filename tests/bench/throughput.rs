@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cpu_time::ProcessTime;
-use ntp::dataset::{ConvertConfig, DatasetTrials, RecordingEpisodes, convert, read_trials};
+use ntp::dataset::{ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, convert, read_trials};
 use ntp::expert::demonstrate;
 use ntp::model::{Decoder, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
@@ -20,6 +20,14 @@ use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
 use ntp::trace::{Actor, Episode, Frame, Provenance, SpecificationForm};
 use ntp::training::{Hooks, TrainConfig, Training, train};
+
+/// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
+fn load(dataset: &Path) -> usize {
+    let mut pictures = EpisodePictures::open(dataset, "front").expect("the dataset can be read");
+    let n_episodes = pictures.n_episodes();
+    let read = |at: usize| pictures.read((at * 7919) % n_episodes).expect("the pictures can be read").len();
+    (0..4 * n_episodes).map(read).sum()
+}
 
 /// Runs the convert stage alone, in a process of its own, and prints its peak memory.
 const CONVERT_CHILD: &str = "--convert-child";
@@ -39,7 +47,7 @@ fn main() {
     if ["render_64", "render_224"].into_iter().any(wanted) {
         render();
     }
-    if ["generate_stacking_video_64", "convert_images_64"].into_iter().any(wanted) {
+    if ["generate_stacking_video_64", "convert_images_64", "load_images_64", "load_video_64"].into_iter().any(wanted) {
         bench.videos();
     }
     if wanted("generate_sorting_40") {
@@ -161,14 +169,21 @@ impl Bench {
         };
         let (_, secs) = cpu_secs(|| generate("video.mcap", PictureFormat::H264, 10));
         report("generate_stacking_video_64", n_episodes as f64 / secs, "demonstrations per CPU-second");
+        let convert = |path: &Path, out: &Path| {
+            let episodes = ShardReader::open(path).expect("the recording can be read").boundaries().pictured();
+            let (file, sha256) = ("recording.mcap".to_owned(), String::new());
+            let recording = Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes });
+            convert([recording], &ConvertConfig::default(), out).expect("it can be converted")
+        };
         let path = generate("images.mcap", PictureFormat::Png, 0);
-        let episodes = ShardReader::open(&path).expect("the recording can be read").boundaries().pictured();
-        let (file, sha256) = ("images.mcap".to_owned(), String::new());
-        let recording = Ok::<_, RecordingError>(RecordingEpisodes { file, sha256, episodes });
-        let out = self.folder.join("images");
-        let (_, secs) =
-            cpu_secs(|| convert([recording], &ConvertConfig::default(), &out).expect("it can be converted"));
+        let (images, videos) = (self.folder.join("images"), self.folder.join("videos"));
+        let (_, secs) = cpu_secs(|| convert(&path, &images));
         report("convert_images_64", n_episodes as f64 / secs, "episodes per CPU-second");
+        convert(&self.folder.join("video.mcap"), &videos);
+        for (name, dataset) in [("load_images_64", &images), ("load_video_64", &videos)] {
+            let (n_pictures, secs) = cpu_secs(|| load(dataset));
+            report(name, n_pictures as f64 / secs, "pictures per CPU-second");
+        }
     }
 
     /// Demonstrations with 40 objects, boundary frames, to MCAP.

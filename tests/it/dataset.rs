@@ -89,7 +89,18 @@ fn config(frames: FrameChoice) -> ConvertConfig {
     ConvertConfig { frames, ..ConvertConfig::default() }
 }
 
-/// What a learner should read of an episode.
+/// What a learner should read of a dataset's episodes, made with a choice of frames.
+fn expected_trials(episodes: &[Episode], frames: FrameChoice) -> Vec<TrialData> {
+    let of_dataset = |(at, episode): (usize, &Episode)| {
+        let trial = expected_trial(episode);
+        let boundaries = episode.boundary_frames().map(|(row, _)| row as u32);
+        let rows = if frames == FrameChoice::All { boundaries.collect() } else { trial.rows.clone() };
+        TrialData { episode: at, rows, ..trial }
+    };
+    episodes.iter().enumerate().map(of_dataset).collect()
+}
+
+/// The same of one that is the only one in a dataset of boundary frames.
 fn expected_trial(episode: &Episode) -> TrialData {
     let boundaries: Vec<usize> = episode.boundary_frames().map(|(at, _)| at).collect();
     let row = |frame: u32| boundaries.iter().position(|&boundary| boundary == frame as usize).unwrap() as u32;
@@ -105,7 +116,9 @@ fn expected_trial(episode: &Episode) -> TrialData {
         family: episode.provenance.family,
         split: episode.provenance.split,
         trial: episode.provenance.trial,
+        episode: 0,
         n_frames: boundaries.len(),
+        rows: (0..boundaries.len() as u32).collect(),
         observations: episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect(),
         calls: episode.calls.iter().map(call).collect(),
         instructions: instructions(&episode.calls, &episode.scene.slots),
@@ -129,7 +142,7 @@ fn a_learner_reads_what_the_episodes_hold() {
         assert_eq!(summary.episodes, episodes.len() as u64);
         let trials = read_trials(folder.path()).unwrap();
         assert_eq!(trials.n_slots, 8);
-        assert_eq!(trials.trials, episodes.iter().map(expected_trial).collect::<Vec<_>>());
+        assert_eq!(trials.trials, expected_trials(&episodes, FrameChoice::Boundaries));
     }
 }
 
@@ -137,8 +150,7 @@ fn a_learner_reads_what_the_episodes_hold() {
 fn frames_between_boundaries_change_nothing_for_a_learner() {
     let sparse = episodes();
     let dense: Vec<Episode> = sparse.iter().map(|episode| densify(episode, 3)).collect();
-    let expected: Vec<TrialData> = sparse.iter().map(expected_trial).collect();
-    assert_eq!(dense.iter().map(expected_trial).collect::<Vec<_>>(), expected);
+    assert_eq!(expected_trials(&dense, FrameChoice::Boundaries), expected_trials(&sparse, FrameChoice::Boundaries));
     for frames in [FrameChoice::Boundaries, FrameChoice::All] {
         let folder = tempfile::tempdir().unwrap();
         let summary = convert_all(&dense, &config(frames), folder.path()).unwrap();
@@ -147,7 +159,7 @@ fn frames_between_boundaries_change_nothing_for_a_learner() {
             FrameChoice::All => dense.iter().map(|episode| episode.frames.len()).sum(),
         };
         assert_eq!(summary.frames, n_frames as u64);
-        assert_eq!(read_trials(folder.path()).unwrap().trials, expected);
+        assert_eq!(read_trials(folder.path()).unwrap().trials, expected_trials(&dense, frames));
     }
 }
 

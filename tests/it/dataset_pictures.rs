@@ -16,10 +16,10 @@ use re_lerobot::datasetv3::LeRobotDatasetV3;
 use crate::dataset::{densify, episodes};
 
 /// The feature of each camera, and how far a value may be off on average.
-const CAMERAS: [(&str, PictureFormat, f64); 2] =
+pub(crate) const CAMERAS: [(&str, PictureFormat, f64); 2] =
     [("front", PictureFormat::Png, 0.0), ("wrist", PictureFormat::H264, 8.0)];
 
-fn cameras() -> Vec<CameraConfig> {
+pub(crate) fn cameras() -> Vec<CameraConfig> {
     let of = |(name, format, _): (&str, PictureFormat, f64)| {
         let view = if name == "front" { Viewpoint::Front } else { Viewpoint::Wrist };
         CameraConfig { format, ..CameraConfig::new(view, [64, 48]) }
@@ -272,16 +272,9 @@ fn a_repaired_dataset_ends_before_the_first_picture_that_cannot_be_decoded() {
     assert_eq!(all_pictures(&mended, "wrist"), before[..3]);
 }
 
-/// Where a sample of a video begins: samples lie one after another behind the head of the box `mdat`.
+/// Where a sample of a video begins.
 fn sample_offset(path: &Path, sample: usize) -> usize {
-    let bytes = std::fs::read(path).unwrap();
-    let begin = bytes.windows(4).position(|name| name == b"mdat").unwrap() + 4;
-    let mut reader = Mp4Reader::open(path).unwrap();
-    let mut packet = Vec::new();
-    (0..sample).fold(begin, |offset, sample| {
-        reader.read(sample, &mut packet).unwrap();
-        offset + packet.len()
-    })
+    Mp4Reader::open(path).unwrap().samples()[sample].offset as usize
 }
 
 #[test]

@@ -133,7 +133,7 @@ pub(crate) fn tower(id: &str, blocks: &[u16], split: Split) -> Task {
     let goals: Vec<Goal> =
         blocks.windows(2).map(|pair| Goal { source: SlotIndex(pair[1]), target: SlotIndex(pair[0]) }).collect();
     let conditions = goals.iter().map(|goal| Condition::OnTop { upper: goal.source, lower: goal.target }).collect();
-    Task { id: id.to_owned(), family: Family::BlockStacking, goals, conditions, split }
+    Task { id: id.to_owned(), family: Family::BlockStacking, goals, conditions, split, blocks: None }
 }
 
 /// A sorting task that puts category `i` into container `mapping[i]`.
@@ -144,7 +144,7 @@ pub(crate) fn sorting(id: &str, mapping: [u16; 4], split: Split) -> Task {
         pairs.map(|(category, bin)| Goal { source: SlotIndex(category), target: SlotIndex(4 + bin) }).collect();
     let conditions =
         goals.iter().map(|goal| Condition::Inside { category: goal.source, container: goal.target }).collect();
-    Task { id: id.to_owned(), family: Family::ObjectSorting, goals, conditions, split }
+    Task { id: id.to_owned(), family: Family::ObjectSorting, goals, conditions, split, blocks: None }
 }
 
 /// A clean-up task that stacks the given bowls, lowest first.
@@ -155,7 +155,7 @@ pub(crate) fn cleanup(id: &str, bowls: &[u16], split: Split) -> Task {
     let below = std::iter::once(tray).chain(bowls.clone());
     let goals: Vec<Goal> = bowls.chain([fork]).zip(below).map(|(source, target)| Goal { source, target }).collect();
     let conditions = goals.iter().map(|goal| goal.brings_about(Family::TableCleanup)).collect();
-    Task { id: id.to_owned(), family: Family::TableCleanup, goals, conditions, split }
+    Task { id: id.to_owned(), family: Family::TableCleanup, goals, conditions, split, blocks: None }
 }
 
 /// A trial of a task with the given number of each category.

@@ -13,11 +13,17 @@ mod dataset;
 #[cfg(test)]
 mod dataset_edit;
 #[cfg(test)]
+mod dataset_loading;
+#[cfg(test)]
 mod dataset_pictures;
+#[cfg(test)]
+mod detecting;
 #[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;
+#[cfg(test)]
+mod forward;
 #[cfg(test)]
 mod fuzz;
 #[cfg(test)]
@@ -38,6 +44,8 @@ mod model;
 mod painter;
 #[cfg(test)]
 mod pipeline;
+#[cfg(test)]
+mod pipeline_pictures;
 #[cfg(test)]
 mod pipeline_suites;
 #[cfg(test)]

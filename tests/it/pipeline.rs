@@ -132,17 +132,23 @@ fn a_shard_that_does_not_exist_is_refused_with_those_that_do() {
 }
 
 #[test]
-fn a_model_of_another_family_is_refused_with_its_path() {
+fn a_model_of_another_family_or_variant_is_refused_with_its_path_and_what_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(run_smoke(folder.path(), &["--to", "train"]).0, 0);
     let config = folder.path().join("models/ntp-seed0/config.json");
     let text = std::fs::read_to_string(&config).unwrap();
-    let other = text.replace("block_stacking", "object_sorting");
-    assert!(other.len() == text.len() && other != text);
-    std::fs::write(&config, other).unwrap();
-    let (code, _, stderr) = run_smoke(folder.path(), &[]);
-    assert_eq!(code, 1);
-    assert!(stderr.contains("config.json") && stderr.contains("object_sorting"), "{stderr}");
+    // As many bytes as before: the manifest looks at no more when it says what is up to date.
+    for (own, other, expected) in [
+        ("\"block_stacking\"", "\"object_sorting\"", "model is for family object_sorting, but block_stacking is"),
+        ("\"variant\": \"ntp\"", "\"variant\":\"flat\"", "model is for variant flat, but ntp is asked for"),
+    ] {
+        let changed = text.replacen(own, other, 1);
+        assert!(changed.len() == text.len() && changed != text, "{own} in {text}");
+        std::fs::write(&config, changed).unwrap();
+        let (code, _, stderr) = run_smoke(folder.path(), &[]);
+        assert_eq!(code, 1);
+        assert!(stderr.contains("models/ntp-seed0/config.json") && stderr.contains(expected), "{stderr}");
+    }
 }
 
 #[test]
@@ -154,8 +160,9 @@ fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
     let pipeline = folder.path().join("changed.toml");
     std::fs::write(&pipeline, changed).unwrap();
     let (path, out) = (pipeline.to_string_lossy(), folder.path().to_string_lossy());
-    let (code, stdout, _) = run(&["run", path.as_ref(), "--out", out.as_ref(), "--dry-run"]);
+    let (code, stdout, stderr) = run(&["run", path.as_ref(), "--out", out.as_ref(), "--dry-run"]);
     assert_eq!(code, 0);
+    assert!(stderr.contains("left: train 1 of 1"), "{stderr}");
     let line = |start: &str| stdout.lines().find(|line| line.starts_with(start)).unwrap_or_default().to_owned();
     assert!(line("convert").contains("up to date"), "{stdout}");
     assert!(line("train").contains("its setting training changed"), "{stdout}");
@@ -252,7 +259,11 @@ fn a_wrong_pipeline_file_names_file_key_and_what_is_allowed_and_writes_nothing()
     let model = |more: &'static str| move |text: &str| text.replace("\"ntp\"\n", &format!("\"ntp\"\n{more}\n"));
     check_refused(model("decoders = []"), "models[0].decoders", "argmax, mss, am");
     check_refused(model("decoders = [\"mss\", \"mss\"]"), "models[0].decoders", "mss is there twice");
+    check_refused(model("tag = \"a b\""), "models[0].tag", "letters");
     check_refused(model("suites = [\"stacking\"]"), "models[0].suites", "there are stacking_unseen");
+    let tasks = |more: &'static str| move |text: &str| text.replace("unseen = 4", &format!("unseen = 4\n{more}"));
+    check_refused(tasks("blocks = 9"), "tasks.blocks", "2 to 8");
+    check_refused(tasks("blocks = 2"), "tasks.train", "block_stacking with 2 blocks has at most 2 training tasks");
     let counts = "episodes = 4\non_table = { min = 1, max = 2 }";
     check_refused(|text| text.replace("episodes = 4\n", &format!("{counts}\n")), "on_table", "no categories");
 }

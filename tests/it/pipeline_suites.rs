@@ -35,6 +35,7 @@ import = "authors.json"
 trials_per_task = 2
 [[models]]
 variant = "ntp"
+train_tasks = 2
 [models.training]
 steps = 4
 [rollout]
@@ -88,12 +89,39 @@ fn imported_tasks_run_through_every_stage_and_suite() {
         assert_eq!(of_oracle(suite)["successes"], 4, "{suite}");
         assert_eq!(of_oracle(suite)["pushes"], Value::Null, "{suite} has no adversary");
     }
+    let tasks_of = |variant: &str, suite: &str| {
+        let sql =
+            format!("SELECT task_id FROM rollouts WHERE variant = '{variant}' AND suite = '{suite}' ORDER BY episode");
+        let (_, rows, _) = ntp(&["query", &out.to_string_lossy(), &sql, "--json"]);
+        let rows: Value = serde_json::from_str(&rows).unwrap();
+        let ids = rows
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| row["task_id"].as_str().unwrap().trim_start_matches("authors_").to_owned());
+        ids.collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(tasks_of("ntp", "stacking_topology"), "0 1 0 1", "seen are those that the model was trained on");
+    assert_eq!(tasks_of("oracle", "stacking_topology"), "0 1 2 3");
+    assert_eq!(tasks_of("ntp", "stacking_unseen"), "4 5 6 7");
     let pushes = of_oracle("stacking_adversary")["pushes"].as_u64().unwrap();
     let toppled = of_oracle("stacking_adversary")["toppled"].as_u64().unwrap();
     assert!(pushes > 0 && toppled > 0, "{pushes} pushes toppled {toppled} blocks");
     let recorded = out.join("rollouts/oracle/stacking_adversary").to_string_lossy().into_owned();
     let (code, stdout, stderr) = ntp(&["replay", &recorded, "--episode", "1", "--verify"]);
     assert_eq!(code, 0, "pushes repeat when an episode is simulated again: {stdout} {stderr}");
+    let rrd = folder.path().join("pushed.rrd").to_string_lossy().into_owned();
+    let (code, stdout, stderr) = ntp(&["replay", &recorded, "--episode", "0,1", "--save", &rrd, "--json"]);
+    assert_eq!(code, 0, "{stderr}");
+    let replayed: Value = serde_json::from_str(&stdout).unwrap();
+    let sql = "SELECT pushes FROM rollouts WHERE variant = 'oracle' AND suite = 'stacking_adversary' ORDER BY episode";
+    let (_, rows, _) = ntp(&["query", &out.to_string_lossy(), sql, "--json"]);
+    let rows: Value = serde_json::from_str(&rows).unwrap();
+    for (episode, row) in replayed["episodes"].as_array().unwrap().iter().zip(rows.as_array().unwrap()) {
+        let pushes = episode["pushes"].as_array().unwrap();
+        assert_eq!(row["pushes"], pushes.len(), "a recording has every push");
+        assert!(pushes.iter().all(|push| push["secs"].as_f64().unwrap() > 0.0), "{pushes:?}");
+    }
 }
 
 #[track_caller]

@@ -24,7 +24,7 @@ fn an_imported_episode_is_shown_as_a_program_tree() {
     assert_eq!(features, [("observation.state", 26), ("action", 4)]);
 
     let path = folder.path().join("episode.rrd");
-    let summary = save_playbacks(&[playback.clone()], &path).unwrap();
+    let summary = save_playbacks(std::slice::from_ref(&playback), &path).unwrap();
     assert_eq!((summary.episodes, summary.frames, summary.calls), (1, 5, 3));
     let recordings = recordings(&path);
     let chunks = recordings.values().next().unwrap();

@@ -1,7 +1,9 @@
 //! Pictures with known answers: places, depths, segments, light, and that all of it repeats.
 
 use ntp::geometry::{Pose, Rotation, Vec3, upright};
-use ntp::render::{Camera, Look, Mount, Randomization, Renderer, Segment, Shadows, looking_at};
+use ntp::render::{
+    Camera, CameraConfig, Letters, Look, Mount, Randomization, Renderer, Segment, Shadows, Viewpoint, looking_at,
+};
 use ntp::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape};
 use ntp::seed::Seed;
 use ntp::task::{Family, initial_state, scene};
@@ -204,14 +206,43 @@ fn with_one_color_blocks_differ_by_their_letters_alone() {
     assert!(look.body_colors.windows(2).all(|pair| pair[0] == pair[1]));
     let mut state = initial_state(Family::BlockStacking, &scene, Seed(3));
     let pose = state.bodies_in_world[0];
-    let mut seen = |body: usize, letters: bool| {
+    let mut seen = |body: usize, letters: Letters| {
         state.bodies_in_world.iter_mut().for_each(|far| far.translation.vector.x = 9.0);
         state.bodies_in_world[body] = pose;
         let camera = Camera::front(Family::BlockStacking, [224, 224]);
         Renderer::new(Look { letters, ..look.clone() }).draw(&scene, &state, &camera).rgb.clone()
     };
-    assert_ne!(seen(0, true), seen(1, true));
-    assert_eq!(seen(0, false), seen(1, false));
+    assert_ne!(seen(0, Letters::Small), seen(1, Letters::Small));
+    assert_eq!(seen(0, Letters::None), seen(1, Letters::None));
+}
+
+#[test]
+fn any_two_letters_of_one_color_differ_at_64_pixels() {
+    let scene = scene(Family::BlockStacking, &[1; 8]);
+    let randomize = Randomization { light: 0.5, color: 0.3, one_color: true, ..Randomization::default() };
+    let config = CameraConfig { randomize, ..CameraConfig::new(Viewpoint::Front, [64, 64]) };
+    for seed in 0..8 {
+        let camera = config.camera(Family::BlockStacking, Seed(seed));
+        let mut renderer = Renderer::new(config.look(&scene, Seed(seed)));
+        let mut state = initial_state(Family::BlockStacking, &scene, Seed(seed));
+        let pose = state.bodies_in_world[seed as usize];
+        let mut shown = |body: usize| {
+            state.bodies_in_world.iter_mut().for_each(|far| far.translation.vector.x = 9.0);
+            state.bodies_in_world[body] = pose;
+            let picture = renderer.draw(&scene, &state, &camera);
+            let pixels = (0..64 * 64).filter(|&pixel| picture.segments[pixel] == 3 + body as u16);
+            pixels.flat_map(|pixel| &picture.rgb[3 * pixel..][..3]).copied().collect::<Vec<u8>>()
+        };
+        let blocks: Vec<Vec<u8>> = (0..8).map(&mut shown).collect();
+        for (at, one) in blocks.iter().enumerate() {
+            for (other_at, other) in blocks.iter().enumerate().skip(at + 1) {
+                assert!((60..180).contains(&one.len()) && one.len() == other.len(), "{} bytes", one.len());
+                let squares: u32 = one.iter().zip(other).map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2)).sum();
+                let apart = (squares as f32 / one.len() as f32).sqrt();
+                assert!(apart > 4.0, "seed {seed}: letters {at} and {other_at} are {apart} of 255 apart");
+            }
+        }
+    }
 }
 
 #[test]
@@ -223,6 +254,33 @@ fn a_camera_in_the_middle_of_things_draws_without_fault() {
             let picture =
                 Renderer::new(Look::smooth()).draw(&scene, &state, &Camera::new(mount, [33, 17], 1.5)).clone();
             assert!(picture.depth_m.iter().all(|depth| *depth > 0.0));
+        }
+    }
+}
+
+#[test]
+fn blocks_that_stand_aside_are_in_no_usual_picture() {
+    let scene = scene(Family::BlockStacking, &[1, 1, 0, 0, 0, 0, 0, 0]);
+    let reach = Randomization { camera_m: 0.03, camera_rad: 0.05, ..Randomization::default() };
+    let [front, wrist] = [Camera::front(Family::BlockStacking, [64, 64]), Camera::wrist([64, 64])];
+    let mut renderer = Renderer::new(Look::plain());
+    let mut check = |state: &SceneState, camera: &Camera, seen: &[u16]| {
+        let segments = &renderer.draw(&scene, state, camera).segments;
+        for body in scene.body_indices() {
+            let is_seen = segments.contains(&Segment::Body(body).number());
+            assert!(!is_seen || seen.contains(&body.0), "{}", scene.body(body).name);
+        }
+    };
+    for seed in 0..100 {
+        let state = initial_state(Family::BlockStacking, &scene, Seed(seed));
+        for camera in [front, wrist, reach.camera(&front, Seed(seed))] {
+            check(&state, &camera, &[0, 1]);
+        }
+        for above in [0, 1] {
+            let mut over = state.clone();
+            over.gripper_in_world.translation.vector = state.bodies_in_world[above].translation.vector;
+            over.gripper_in_world.translation.vector.z += 0.3;
+            check(&over, &wrist, &[0, 1]);
         }
     }
 }

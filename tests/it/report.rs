@@ -4,7 +4,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use ntp::report::{
-    Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, Verdict, json_schema, make, paper_values,
+    DetectionsInput, Fact, InSight, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, Verdict,
+    json_schema, make, paper_values,
 };
 use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
 use serde_json::{Value, json};
@@ -118,6 +119,7 @@ fn model() -> ModelSummary {
     ModelSummary {
         experiment: "ten".to_owned(),
         variant: "ntp".to_owned(),
+        tag: None,
         train_tasks: 100,
         specification: "trajectories".to_owned(),
         seed: 0,
@@ -127,7 +129,7 @@ fn model() -> ModelSummary {
 }
 
 fn input(path: PathBuf) -> RolloutsInput {
-    RolloutsInput { experiment: "ten".to_owned(), path }
+    RolloutsInput { experiment: "ten".to_owned(), tag: None, path }
 }
 
 /// A run directory with ten rollouts in one file and one training.
@@ -160,6 +162,7 @@ impl Run {
             }],
             commits: vec!["0123456789".to_owned()],
             paper: paper_values(),
+            ..ReportInputs::default()
         };
         Self { folder, inputs }
     }
@@ -186,11 +189,50 @@ fn ten_rollouts_become_a_results_table() {
     let run = Run::new(&ten_rollouts());
     run.make();
     insta::assert_snapshot!(run.text("results.csv"), @r#"
-    experiment,variant,train_tasks,specification,decoder,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs,pushes,toppled
-    ten,ntp,100,trajectories,mss,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000,10,20
-    ten,ntp,100,trajectories,mss,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000,3,6
-    ten,flat,100,trajectories,mss,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000,,
+    experiment,variant,tag,train_tasks,specification,decoder,suite,seed,episodes,successes,success_rate,wilson_low,wilson_high,causes,mean_calls,mean_sim_secs,pushes,toppled
+    ten,ntp,,100,trajectories,mss,stacking_unseen,0,5,4,0.800000,0.375535,0.963776,ended_early=1,32.000000,10.200000,10,20
+    ten,ntp,,100,trajectories,mss,stacking_unseen,1,3,3,1.000000,0.438503,1.000000,"",31.000000,10.100000,3,6
+    ten,flat,,100,trajectories,mss,stacking_unseen,0,2,0,0.000000,0.000000,0.657620,missed_grasp=1;never_ended=1,30.500000,10.050000,,
     "#);
+}
+
+/// A detector's errors along x, in two frames of two blocks each, one of which is half hidden.
+fn detections_table() -> DataFrame {
+    df!(
+        "variant" => vec!["ntp_vid_detector"; 4],
+        "suite" => vec!["stacking_unseen"; 4],
+        "training_seed" => vec![0_i64; 4],
+        "train_tasks" => vec![100_i64; 4],
+        "error_x_m" => vec![0.001_f64, -0.003, 0.001, -0.03],
+        "error_y_m" => vec![0.0_f64; 4],
+        "error_z_m" => vec![0.0_f64, 0.004, 0.0, 0.04],
+        "visible_share" => vec![1.0_f64, 0.8, 0.9, 0.5],
+    )
+    .unwrap()
+}
+
+#[test]
+fn detections_become_errors_in_centimetres_by_what_is_in_sight() {
+    let mut run = Run::new(&ten_rollouts());
+    let path = run.folder.path().join("rollouts/all/detections.parquet");
+    write_parquet(&path, detections_table());
+    run.inputs.detections = vec![DetectionsInput { experiment: "ten".to_owned(), path }];
+    let report = run.make();
+    let parts: Vec<InSight> = report.detections.iter().map(|error| error.in_sight).collect();
+    assert_eq!(parts, [InSight::All, InSight::Full, InSight::Part]);
+    let all = &report.detections[0];
+    assert_eq!((all.detections, all.seeds), (4, 1));
+    // Distances are 0.1, 0.1, 0.5 and 5 cm.
+    assert_eq!([all.median_cm, all.percentile_95_cm, all.over_2_cm], [0.1, 5.0, 0.25]);
+    assert_eq!(all.mean_absolute_cm, [0.875, 0.0, 1.1]);
+    // Squares along x sum up to 9.11 cm², with a mean error of -0.775 cm; along z to 16.16 cm², with one of 1.1 cm.
+    let variance = (9.11 / 4.0 - 0.775_f64.powi(2) + 16.16 / 4.0 - 1.1_f64.powi(2)) / 3.0;
+    assert!((all.deviation_cm - variance.sqrt()).abs() < 1e-9, "{}", all.deviation_cm);
+    assert_eq!((report.detections[1].detections, report.detections[2].median_cm), (3, 5.0));
+    for (file, told) in [("report.md", "| 1/4 to 3/4"), ("index.html", "Detectors"), ("report.json", "\"in_sight\"")] {
+        assert!(run.text(file).contains(told), "{file}");
+    }
+    assert!(report.inputs.iter().any(|input| input.path.ends_with("detections.parquet")));
 }
 
 #[test]
@@ -200,10 +242,10 @@ fn a_training_becomes_curves() {
     let curves = run.text("curves.csv");
     let head: Vec<&str> = curves.lines().take(4).collect();
     insta::assert_snapshot!(head.join("\n"), @"
-    experiment,variant,train_tasks,specification,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
-    ten,ntp,100,trajectories,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
-    ten,ntp,100,trajectories,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
-    ten,ntp,100,trajectories,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
+    experiment,variant,tag,train_tasks,specification,seed,level,step,loss_total,loss_program,loss_end,loss_scope,loss_argument
+    ten,ntp,,100,trajectories,0,block_stacking,2,0.993108,0.993108,,0.993108,0.993108
+    ten,ntp,,100,trajectories,0,block_stacking,5,0.972671,0.972671,,0.972671,0.972671
+    ten,ntp,,100,trajectories,0,block_stacking,8,0.952653,0.952653,,0.952653,0.952653
     ");
     assert_eq!(curves.lines().count(), 1 + 2 * 100, "300 steps are 100 points of 3 steps at each of 2 levels");
 }
@@ -236,6 +278,10 @@ fn seeds_are_averaged_and_the_paper_stands_beside() {
     assert!((ntp.mean_success_rate - 0.9).abs() < 1e-12);
     assert_eq!((ntp.lowest_success_rate, ntp.highest_success_rate), (0.8, 1.0));
     assert_eq!((ntp.wilson_low, ntp.wilson_high), ntp::report::wilson(7, 8));
+    let (low, high) = ntp::report::student(&[0.8, 1.0]).unwrap();
+    assert_eq!((ntp.seeds_low, ntp.seeds_high), (Some(low), Some(high)));
+    assert_eq!((flat.seeds_low, flat.seeds_high), (None, None), "one seed says nothing of others");
+    assert_eq!((ntp.pushes, ntp.toppled, flat.pushes), (Some(13), Some(26), None));
     assert_eq!((ntp.paper_success_rate, flat.paper_success_rate), (Some(0.863), None));
 }
 
@@ -253,6 +299,59 @@ fn models_that_differ_in_tasks_or_decoder_are_told_apart() {
     let told: Vec<_> = told.collect();
     let of = |name, n| [(name, 100, "mss", n), (name, 100, "argmax", n), (name, 20, "mss", n)];
     assert_eq!(told, [of("ntp", 8), of("flat", 2)].concat());
+}
+
+#[test]
+fn a_tagged_model_is_told_apart_and_stands_for_no_model_of_the_paper() {
+    let mut run = Run::new(&ten_rollouts());
+    let tagged = run.folder.path().join("rollouts/tagged/rollouts.parquet");
+    let rows: Vec<Rollout> = ten_rollouts().into_iter().map(|row| Rollout { cause: None, ..row }).collect();
+    write_parquet(&tagged, rollouts_table(&rows));
+    run.inputs.rollouts.push(RolloutsInput { tag: Some("adaptive".to_owned()), ..input(tagged) });
+    let report = run.make();
+    let told: Vec<_> = report
+        .aggregates
+        .iter()
+        .map(|row| (row.actor.variant.as_str(), row.actor.tag.as_deref(), row.successes, row.paper_success_rate))
+        .collect();
+    let expected = [
+        ("ntp", None, 7, Some(0.863)),
+        ("ntp", Some("adaptive"), 8, None),
+        ("flat", None, 0, None),
+        ("flat", Some("adaptive"), 2, None),
+    ];
+    assert_eq!(told, expected);
+    assert!(report.claims.iter().all(|claim| !claim.ours.contains("1.000")), "{:?}", report.claims);
+    assert!(run.text("report.md").contains("| ntp (adaptive) "));
+    assert!(run.text("index.html").contains("<code>ntp (adaptive)</code>"));
+}
+
+#[test]
+fn pushes_and_what_they_toppled_stand_on_the_page() {
+    let run = Run::new(&ten_rollouts());
+    run.make();
+    let page = run.text("index.html");
+    let (_, table) = page.split_once("what the adversary did, and what toppled").unwrap();
+    // Of `ntp` alone: 13 pushes in 8 rollouts, 26 bodies.
+    for cell in ["<td class=\"n\">13</td><td class=\"n\">1.62</td>", "<td class=\"n\">26</td><td class=\"n\">2.00</td>"]
+    {
+        assert!(table.contains(cell), "{cell}");
+    }
+}
+
+#[test]
+fn force_becomes_a_figure_when_it_is_swept() {
+    let suites = ["stacking_unseen", "stacking_adversary", "stacking_adversary_030_mns", "stacking_adversary_120_mns"];
+    let rows: Vec<Vec<Rollout>> =
+        suites.iter().zip([20, 16, 19, 10]).map(|(suite, n)| rollouts("ntp", suite, n, 20)).collect();
+    let figures = Run::new(&rows.concat()).make().figures;
+    let force = figures.iter().find(|figure| figure.id == "stacking_adversary_force").unwrap();
+    let points: Vec<_> = force.series[0].ours.iter().map(|point| (point.x, point.success_rate)).collect();
+    assert_eq!(points, [(0, 1.0), (30, 0.95), (60, 0.8), (120, 0.5)]);
+    let chance = figures.iter().find(|figure| figure.id == "stacking_adversary").unwrap();
+    assert_eq!(chance.series[0].ours.iter().map(|point| point.x).collect::<Vec<_>>(), [0, 25]);
+    let figures = Run::new(&rows[..2].concat()).make().figures;
+    assert!(figures.iter().all(|figure| figure.id != "stacking_adversary_force"), "two forces are no sweep");
 }
 
 #[test]
@@ -281,14 +380,23 @@ fn the_markdown_says_what_made_the_figures() {
     insta::assert_snapshot!(run.text("report.md"), @"
     **Ten <rollouts>**: ntp 0.1.0, commit 0123456789, training seeds 0, 1.5 CPU-minutes.
 
-    | suite           | model | tasks | decoder | seeds | rollouts | success | 95 %           | paper |
-    | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | -------------- | ----: |
-    | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978] | 0.863 |
-    | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658] |     - |
+    | suite           | model | tasks | decoder | seeds | rollouts | success | 95 % over rollouts | lowest, highest seed | 95 % over seeds | paper |
+    | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | ------------------ | -------------------- | --------------- | ----: |
+    | stacking_unseen | ntp   |   100 | mss     |     2 |        8 |   0.900 | [0.529, 0.978]     | 0.800, 1.000         | [0.000, 1.000]  | 0.863 |
+    | stacking_unseen | flat  |   100 | mss     |     1 |        2 |   0.000 | [0.000, 0.658]     | -                    | -               |     - |
 
     | the paper's claim                                 | encoder        | here       | figures                                                                         |
     | ------------------------------------------------- | -------------- | ---------- | ------------------------------------------------------------------------------- |
     | NTP stacks unseen configurations better than Flat | object-centric | reproduced | ntp 0.900 (stacking_unseen, 100 tasks), flat 0.000 (stacking_unseen, 100 tasks) |
+
+    | suite           | model | tasks | decoder | failed | as judged                     | first error: program and kind                         |
+    | --------------- | ----- | ----: | ------- | -----: | ----------------------------- | ----------------------------------------------------- |
+    | stacking_unseen | ntp   |   100 | mss     |      1 | ended early 1                 | pick and place: scope 1                               |
+    | stacking_unseen | flat  |   100 | mss     |      2 | missed grasp 1, never ended 1 | block stacking: argument 1, block stacking: program 1 |
+
+    | experiment | model | tasks | seeds | parameters | CPU-seconds a training |
+    | ---------- | ----- | ----: | ----: | ---------: | ---------------------: |
+    | ten        | ntp   |   100 |     1 |     25 123 |                     90 |
     ");
 }
 
@@ -616,4 +724,64 @@ fn the_page_and_the_markdown_say_what_did_not_reproduce() {
     run.make();
     assert!(run.text("index.html").contains("<span class=\"verdict not_reproduced\">not reproduced</span>"));
     assert!(run.text("report.md").contains("| **not reproduced** "));
+}
+
+#[test]
+fn each_way_of_seeing_is_judged_by_itself() {
+    let suite = "stacking_unseen";
+    let rows = [
+        rollouts("ntp", suite, 100, 100),
+        rollouts("ntp_vid_e2e", suite, 80, 100),
+        rollouts("ntp_vid_detector", suite, 79, 100),
+        rollouts("ntp_paper", suite, 60, 100),
+        rollouts("ntp_vid_e2e_paper", suite, 90, 100),
+        rollouts("ntp_vid_detector_paper", suite, 0, 100),
+        rollouts("ntp_vid_e2e_general", suite, 100, 100),
+    ];
+    let (slots, convolutions, general) = ("colour slots", "the paper's convolutions", "general");
+    let (reproduced, not, neither) = (Verdict::Reproduced, Verdict::NotReproduced, Verdict::NoDifference);
+    check_claim("pictures_state", &rows, &[(slots, reproduced), (convolutions, not), (general, neither)]);
+    check_claim("pictures_detector", &rows, &[(slots, neither), (convolutions, reproduced)]);
+    // Without its own full state the paper's network is set beside the plain one.
+    check_claim("pictures_state", &[rows[0].clone(), rows[4].clone()], &[(convolutions, reproduced)]);
+    check_claim("pictures_state", &rows[1..3], &[]);
+}
+
+#[test]
+fn models_that_see_are_compared_after_as_many_training_tasks() {
+    let trained = |tasks: i64, rows: Vec<Rollout>| -> Vec<Rollout> {
+        rows.into_iter().map(|row| Rollout { train_tasks: tasks, ..row }).collect()
+    };
+    let suite = "stacking_unseen";
+    let rows = [
+        trained(1000, rollouts("ntp", suite, 100, 100)),
+        trained(100, rollouts("ntp", suite, 50, 100)),
+        trained(100, rollouts("ntp_vid_e2e", suite, 90, 100)),
+        trained(20, rollouts("ntp_vid_e2e", suite, 10, 100)),
+        trained(20, rollouts("flat", suite, 10, 100)),
+        trained(100, rollouts("flat", suite, 10, 100)),
+    ];
+    check_claim("pictures_state", &rows, &[("colour slots", Verdict::NotReproduced)]);
+    check_claim("pictures_more_tasks", &rows, &[("colour slots", Verdict::Reproduced)]);
+    let report = Run::new(&rows.concat()).make();
+    let variants = |id: &str| -> Vec<String> {
+        let figure = report.figures.iter().find(|figure| figure.id == id).unwrap();
+        figure.series.iter().map(|series| series.variant.clone()).collect()
+    };
+    assert_eq!(variants("stacking_pictures"), ["ntp", "ntp_vid_e2e"]);
+    assert_eq!(variants("stacking_unseen"), ["ntp", "flat"]);
+    let blind = Run::new(&[rows[0].clone(), rows[1].clone()].concat()).make();
+    assert!(blind.figures.iter().all(|figure| figure.id != "stacking_pictures") && blind.notes.is_empty());
+}
+
+#[test]
+fn what_models_that_see_are_given_is_said_of_those_that_are_there() {
+    let run = Run::new(&rollouts("ntp_vid_e2e", "stacking_unseen", 20, 100));
+    run.make();
+    for text in [run.text("index.html"), run.text("report.md")] {
+        for said in ["need things that differ in colour", "is told by the simulator"] {
+            assert!(text.contains(said), "{said}");
+        }
+        assert!(!text.contains("VGG16"));
+    }
 }

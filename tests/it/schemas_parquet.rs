@@ -7,7 +7,8 @@ use ntp::dataset::schema;
 use ntp::table::{ColumnKind, Form, TableSchema, Value};
 
 fn schemas() -> Vec<TableSchema> {
-    schema::ALL.into_iter().chain([TableSchema::ROLLOUTS, TableSchema::METRICS]).collect()
+    let others = [TableSchema::ROLLOUTS, TableSchema::METRICS, TableSchema::DETECTOR_METRICS, TableSchema::DETECTIONS];
+    schema::ALL.into_iter().chain(others).collect()
 }
 
 fn folder() -> &'static Path {

@@ -7,7 +7,7 @@ use burn::tensor::{Device, Tensor};
 use ntp::dataset::DatasetTrials;
 use ntp::model::{
     ColourSlots, ColourSlotsConfig, Convolved, ConvolvedConfig, Decoder, FlatEncoder, Flattened, FlattenedConfig,
-    Network as _, Ntp, Perception as _, PictureSample, Variant, WEIGHTS_FILE,
+    Keypoints, KeypointsConfig, Network as _, Ntp, Perception as _, PictureSample, Pictures, Variant, WEIGHTS_FILE,
 };
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
@@ -58,7 +58,7 @@ fn colour_slots_find_each_block_and_the_robot_first() {
     slots = slots.acquainted(&sample, Seed(2));
     let mut first = Painter::nothing();
     paintings.fetch(0, &[0], &mut first).unwrap();
-    let found = values(slots.look(&first));
+    let found = values(slots.look(&first).0);
     let episode = &paintings.0[0];
     let seen: Vec<[f32; 2]> = found.as_chunks::<4>().0.iter().map(|percept| [percept[0], percept[1]]).collect();
     for body in episode.scene.body_indices() {
@@ -86,6 +86,42 @@ fn the_paper_s_picture_network_has_seven_layers_and_a_vector_of_128() {
     assert_ne!(features[..128], features[128..256]);
 }
 
+/// A picture of noise, and the same further right and down by some pixels.
+fn noise(shift: usize) -> Pictures {
+    let (size, mut pictures) = (64, Pictures::of_size(64, 64));
+    let value = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * y * 31) % 251) as u8;
+    let moved = |at: usize| (at + size - shift) % size;
+    let pixels = (0..size * size).flat_map(|at| [0, 3, 5].map(|more| value(moved(at % size) + more, moved(at / size))));
+    pictures.push(&pixels.collect::<Vec<u8>>());
+    pictures
+}
+
+#[test]
+fn keypoints_have_a_score_for_each_slot_in_each_cell_and_the_robot_first() {
+    let config = KeypointsConfig::of(64, 4);
+    let keypoints = Keypoints::fresh(&config, Seed(1), &Device::flex());
+    let layers = [25 * 3 * 16 + 16, 9 * 16 * 32 + 32, 9 * 32 * 32 + 32, 32 * 5 + 5];
+    assert_eq!(keypoints.num_params(), layers.iter().sum::<usize>());
+    let (percepts, looks) = keypoints.look(&noise(0));
+    assert_eq!((percepts.dims(), looks.scores().dims()), ([1, 5, 4], [1, 256, 4]));
+    for percept in values(percepts).as_chunks::<4>().0 {
+        assert!(percept[..2].iter().all(|place| (-1.0..=1.0).contains(place)), "{percept:?}");
+        assert!((0.0..=1.0).contains(&percept[2]) && percept[3] > 0.0, "{percept:?}");
+    }
+}
+
+#[test]
+fn a_picture_moved_by_a_cell_has_its_scores_a_cell_further() {
+    let keypoints = Keypoints::fresh(&KeypointsConfig::of(64, 4), Seed(1), &Device::flex());
+    let [still, moved] = [0, 4].map(|shift| values(keypoints.look(&noise(shift)).1.scores()));
+    let score = |scores: &[f32], row: usize, column: usize| scores[(row * 16 + column) * 4];
+    // Away from the border, where zeros are seen.
+    for (row, column) in (4..12).flat_map(|row| (4..12).map(move |column| (row, column))) {
+        let (before, after) = (score(&still, row, column), score(&moved, row + 1, column + 1));
+        assert!((before - after).abs() < 1e-3, "{row}, {column}: {before} and {after}");
+    }
+}
+
 #[test]
 fn a_variant_that_sees_is_refused_without_pictures() {
     let (data, _) = shown(&[tower("a", &[0, 1], Split::Seen)], 2);
@@ -98,7 +134,7 @@ fn a_variant_that_sees_is_refused_without_pictures() {
 #[test]
 fn the_same_pictures_give_the_same_weights_for_any_number_of_threads() {
     let shown = shown(&[tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3], Split::Seen)], 3);
-    for variant in [Variant::NtpVidE2e, Variant::NtpVidE2ePaper] {
+    for variant in [Variant::NtpVidE2e, Variant::NtpVidE2ePaper, Variant::NtpVidE2eGeneral] {
         let weights = |threads| {
             let folder = tempfile::tempdir().unwrap();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

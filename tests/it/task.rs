@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use ntp::scene::SlotIndex;
+use ntp::scene::{Mobility, SlotIndex};
 use ntp::seed::Seed;
-use ntp::task::{Condition, Family, Goal, Split, Task, TaskSet, import, sample};
+use ntp::task::{Condition, Family, Goal, Split, Task, TaskPool, TaskSet, import, sample};
 use serde_json::{Value, json};
 
 fn goals_of(set: &TaskSet, split: Split) -> Vec<&[Goal]> {
@@ -60,6 +60,53 @@ fn towers_stand_in_no_order_of_height() {
     let set = sample(Family::BlockStacking, 500, 0, Seed(1)).unwrap();
     let orders: BTreeSet<Vec<usize>> = set.tasks.iter().map(|task| heights(&task.goals)).collect();
     assert!(orders.contains(&vec![3, 4]) && orders.contains(&vec![4, 3]), "{orders:?}");
+}
+
+fn with_blocks(blocks: u16) -> TaskPool {
+    TaskPool { family: Family::BlockStacking, blocks: Some(blocks) }
+}
+
+#[test]
+fn fewer_blocks_have_as_many_end_configurations_as_there_are_towers_of_them() {
+    // Ordered towers without order among themselves: 4!/2! of two, 4! of three, 4! of four, 4!/2! of two and two.
+    for (blocks, all) in [(2, 2), (3, 6 + 6), (4, 12 + 24 + 24 + 12), (5, 20 + 60 + 120 + 60 + 120)] {
+        assert_eq!(with_blocks(blocks).limits(0), (all, all));
+        assert_eq!(with_blocks(blocks).limits(1), (all, all - 1));
+        let set = sample(with_blocks(blocks), all - 1, 1, Seed(3)).unwrap();
+        set.validate().unwrap();
+        let distinct: BTreeSet<_> = set.tasks.iter().map(Task::canonical_goal).collect();
+        assert_eq!(distinct.len(), all as usize);
+        let named = set.tasks.iter().flat_map(|task| task.goals.iter().flat_map(|goal| [goal.source, goal.target]));
+        assert_eq!(named.max(), Some(SlotIndex(blocks - 1)));
+    }
+}
+
+#[test]
+fn a_split_of_few_blocks_depends_on_no_other() {
+    let set = |train, unseen| sample(with_blocks(4), train, unseen, Seed(5)).unwrap();
+    let [few, many, most] = [set(12, 10), set(48, 24), set(10, 62)];
+    assert!(many.of_split(Split::Seen).take(12).eq(few.of_split(Split::Seen)));
+    assert!(many.of_split(Split::Unseen).take(10).eq(few.of_split(Split::Unseen)));
+    assert!(most.of_split(Split::Unseen).take(24).eq(many.of_split(Split::Unseen)));
+    for set in [few, many, most] {
+        set.validate().unwrap();
+    }
+}
+
+#[test]
+fn blocks_that_a_task_leaves_out_stand_aside_and_fixed() {
+    let task = &sample(with_blocks(3), 1, 0, Seed(1)).unwrap().tasks[0];
+    let scene = ntp::task::scene(Family::BlockStacking, &task.counts(|| 7));
+    assert_eq!(scene.slots.len(), Family::BlockStacking.n_slots());
+    for seed in 0..200 {
+        let state = ntp::task::initial_state(Family::BlockStacking, &scene, Seed(seed));
+        for body in scene.body_indices() {
+            let at = state.body_in_world(body).translation.vector;
+            let aside = body.0 >= 3;
+            assert_eq!(scene.body(body).mobility == Mobility::Fixed, aside);
+            assert_eq!(at.x < -0.47 && at.y < -0.42, aside, "seed {seed}: {} at {at}", scene.body(body).name);
+        }
+    }
 }
 
 #[test]
@@ -162,9 +209,11 @@ fn more_tasks_than_there_are_is_an_error() {
     check(
         Family::BlockStacking,
         82_937,
-        0,
-        "block_stacking has at most 82936 seen tasks to draw, 82937 were asked for",
+        82_936,
+        "block_stacking has at most 82935 unseen tasks to draw, 82936 were asked for",
     );
+    let error = sample(with_blocks(4), 73, 0, Seed(1)).unwrap_err();
+    assert_eq!(error.to_string(), "block_stacking has at most 72 seen tasks to draw, 73 were asked for");
 }
 
 #[test]
@@ -177,6 +226,10 @@ fn a_task_file_reads_back_as_it_was_written() {
         assert_eq!(TaskSet::read(&path).unwrap(), set);
         assert!(serde_json::from_slice::<Value>(&std::fs::read(&path).unwrap()).is_ok());
     }
+    let few = sample(with_blocks(4), 5, 5, Seed(2)).unwrap();
+    let path = folder.path().join("few.json");
+    few.write(&path).unwrap();
+    assert_eq!(TaskSet::read(&path).unwrap(), few);
     let empty = TaskSet { family: Family::BlockStacking, tasks: Vec::new() };
     let path = folder.path().join("empty.json");
     empty.write(&path).unwrap();
@@ -276,7 +329,7 @@ fn a_set_made_in_memory_keeps_the_same_rules() {
     let on = |source, target| Goal { source: SlotIndex(source), target: SlotIndex(target) };
     let check = |family, goals: Vec<Goal>, expected: &str| {
         let conditions = vec![Condition::OnTop { upper: SlotIndex(0), lower: SlotIndex(1) }];
-        let task = Task { id: "a".to_owned(), family, goals, conditions, split: Split::Seen };
+        let task = Task { id: "a".to_owned(), family, goals, conditions, split: Split::Seen, blocks: None };
         let error = TaskSet { family, tasks: vec![task] }.validate().unwrap_err();
         assert_eq!(error.to_string(), expected);
     };
@@ -293,6 +346,19 @@ fn a_set_made_in_memory_keeps_the_same_rules() {
         vec![on(0, 5), on(1, 0), on(4, 0)],
         "tasks[0].goals[2]: goals[1] already puts something on bowl_1",
     );
+    let blocks = |blocks: u16, family, expected: &str| {
+        let goals = vec![if family == Family::BlockStacking { on(0, 3) } else { on(0, 4) }];
+        let conditions = vec![goals[0].brings_about(family)];
+        let task = Task { id: "a".to_owned(), family, goals, conditions, split: Split::Seen, blocks: Some(blocks) };
+        let error = TaskSet { family, tasks: vec![task] }.validate().unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    };
+    let allowed = "allowed in block_stacking is 2 to 7, or none for all eight";
+    blocks(8, Family::BlockStacking, &format!("tasks[0].blocks: is 8; {allowed}"));
+    blocks(1, Family::BlockStacking, &format!("tasks[0].blocks: is 1; {allowed}"));
+    blocks(4, Family::ObjectSorting, "tasks[0].blocks: is 4; allowed in object_sorting is none");
+    let aside = "tasks[0].goals[0]: block_D stands aside, only the first 3 blocks are within reach";
+    blocks(3, Family::BlockStacking, aside);
     let mut set = sample(Family::BlockStacking, 1, 0, Seed(1)).unwrap();
     set.family = Family::ObjectSorting;
     let error = set.validate().unwrap_err().to_string();
@@ -346,6 +412,29 @@ fn the_authors_file_becomes_a_task_set() {
     );
     assert_eq!(first.conditions.len(), 4);
     assert_eq!(first.conditions[0], Condition::OnTop { upper: SlotIndex(2), lower: SlotIndex(6) });
+}
+
+/// As large as the authors' own.
+#[test]
+fn two_thousand_tasks_in_the_authors_form_come_back_as_they_were_split_at_a_thousand() {
+    let ours = sample(Family::BlockStacking, 1000, 1000, Seed(3)).unwrap();
+    let cube = |slot: SlotIndex| format!("cube_{}", slot.0);
+    let entry = |task: &Task| {
+        let goals = task
+            .goals
+            .iter()
+            .map(|goal| json!({"name": "pick_place", "src": cube(goal.source), "target": cube(goal.target)}));
+        let ends = task.conditions.iter().map(|condition| match *condition {
+            Condition::OnTop { upper, lower } => json!({"type": "on_top", "src": cube(upper), "target": cube(lower)}),
+            Condition::Inside { .. } => panic!("blocks lie in nothing"),
+        });
+        json!({"id": task.id, "goals": goals.collect::<Vec<_>>(), "end_constraints": ends.collect::<Vec<_>>()})
+    };
+    let mut file = authors_file();
+    file["tasks"] = ours.tasks.iter().map(entry).collect();
+    assert_eq!(write_and_import(&file, 1000).unwrap(), ours);
+    let other = write_and_import(&file, 400).unwrap();
+    assert_eq!((other.of_split(Split::Seen).count(), other.of_split(Split::Unseen).count()), (400, 1600));
 }
 
 #[test]

@@ -4,8 +4,8 @@ use ntp::program::Program;
 use ntp::scene::{BodyIndex, SlotIndex};
 use ntp::task::Split;
 use ntp::trace::{
-    CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Span, TraceError, Vocabulary, instruction_spans,
-    instructions, sentence,
+    CallId, CallProblem, Episode, EpisodeParts, ProgramCall, Push, PushProblem, Span, TraceError, Vocabulary,
+    instruction_spans, instructions, sentence,
 };
 use proptest::prelude::*;
 
@@ -49,6 +49,53 @@ fn frames_must_be_there_in_order_and_finite() {
         |parts| parts.frames[1].slots[0] = BodyIndex(3),
         |error| matches!(error, TraceError::ForeignBody { frame: 1, slot: 0, body: 3 }),
     );
+}
+
+#[test]
+fn pushes_follow_one_another_from_a_frame_to_a_later_boundary() {
+    let push = |begin: u32, end: u32| Push {
+        frames: Span { begin, end },
+        body: BodyIndex(1),
+        impulse_ns: [0.1, 0.0, 0.0],
+        toppled: vec![BodyIndex(1)],
+    };
+    let check = |pushes: Vec<Push>, expected: fn(&PushProblem) -> bool| {
+        let is_expected = |error: &TraceError| matches!(error, TraceError::Push { problem, .. } if expected(problem));
+        check_refused(|parts| parts.pushes = pushes, is_expected);
+    };
+    let mut sound = parts();
+    sound.pushes = vec![push(0, 3), push(2, 4)];
+    assert!(Episode::new(sound).is_ok());
+    for (begin, end) in [(0, 1), (3, 2), (0, 0), (0, 1000)] {
+        check(vec![push(begin, end)], |problem| matches!(problem, PushProblem::Frames { .. }));
+    }
+    check(vec![push(0, 3), push(1, 4)], |problem| matches!(problem, PushProblem::Overlap { begin: 1, before: 2 }));
+    check(vec![Push { body: BodyIndex(8), ..push(0, 2) }], |problem| {
+        matches!(problem, PushProblem::Body { body: 8, bodies: 8 })
+    });
+    check(vec![Push { toppled: vec![BodyIndex(9)], ..push(0, 2) }], |problem| {
+        matches!(problem, PushProblem::Body { body: 9, .. })
+    });
+    check(vec![Push { impulse_ns: [0.0, f32::NAN, 0.0], ..push(0, 2) }], |problem| *problem == PushProblem::NotFinite);
+    check_refused(
+        |parts| {
+            parts.frames[2].boundary = false;
+            parts.pushes = vec![push(0, 3)];
+        },
+        |error| matches!(error, TraceError::Push { push: 0, problem: PushProblem::OffBoundary { frame: 2 } }),
+    );
+}
+
+#[test]
+fn a_push_between_boundaries_counts_from_the_boundary_before_without_the_others() {
+    let mut spread = crate::dataset::densify(&Episode::new(parts()).unwrap(), 3).into_parts();
+    let boundaries: Vec<u32> =
+        spread.frames.iter().zip(0..).filter(|(frame, _)| frame.boundary).map(|(_, at)| at).collect();
+    let frames = Span { begin: boundaries[2] + 1, end: boundaries[3] + 1 };
+    spread.pushes = vec![Push { frames, body: BodyIndex(0), impulse_ns: [0.0, 0.1, 0.0], toppled: Vec::new() }];
+    let found = Episode::new(spread).unwrap().boundaries_only();
+    assert_eq!(found.pushes[0].frames, Span { begin: 2, end: 4 });
+    assert!(Episode::new(found.into_parts()).is_ok());
 }
 
 #[test]

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use ntp::model::Decisions;
 use ntp::program::Program;
 use ntp::rollout::{Decision, Divergence, DivergenceKind, Expectation, Limits, Oracle, Policy, Query, Start, run};
+use ntp::scene::BodyIndex;
 use ntp::task::{Split, Task};
-use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Span};
+use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Push, Span};
 use ntp::visualize::{Replay, VisualizeError, save, save_replays};
 use rerun::StoreKind;
 use rerun::external::re_log_encoding::DecoderApp;
@@ -181,7 +182,7 @@ fn replays_of_a_tower() -> (Episode, Episode, Episode) {
 #[test]
 fn a_recording_has_scene_programs_scopes_and_words_on_two_timelines() {
     let (_, shown, acted) = replays_of_a_tower();
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     let chunks = read.only();
     let found = entities(chunks);
     let bodies = acted.scene.bodies.iter().map(|body| format!("/world/bodies/{}", body.name));
@@ -272,7 +273,7 @@ fn check_lanes(chunks: &[Chunk], root: &str, episode: &Episode) {
 fn each_calls_lane_begins_and_ends_at_its_frames() {
     let (expert, shown, acted) = replays_of_a_tower();
     check_lanes(read_back(&[Replay::from(&expert)]).only(), "programs", &expert);
-    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None }]);
+    let read = read_back(&[Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] }]);
     check_lanes(read.only(), "programs", &acted);
     check_lanes(read.only(), "programs_of_expert", &shown);
 }
@@ -281,7 +282,7 @@ fn each_calls_lane_begins_and_ends_at_its_frames() {
 fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
     let (_, shown, acted) = replays_of_a_tower();
     let divergence = Divergence { decision: 6, kind: DivergenceKind::Argument, program: Program::Pick };
-    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence) };
+    let replay = Replay { episode: &acted, demonstration: Some(&shown), divergence: Some(divergence), cameras: &[] };
     let read = read_back(&[replay]);
     let frame = i64::from(acted.calls[7].frames.begin);
     assert!(frame > 0);
@@ -293,6 +294,35 @@ fn a_lane_turns_at_the_first_divergence_and_words_say_what_it_is() {
     assert_eq!(told, [7]);
     let agreed = read_back(&[Replay { divergence: None, ..replay }]);
     assert_eq!(lane(agreed.only(), "/agreement"), [(0, "as the expert".to_owned())]);
+}
+
+#[test]
+fn a_push_is_an_arrow_a_lane_and_a_line_until_all_rests() {
+    let (expert, ..) = replays_of_a_tower();
+    let mut parts = expert.into_parts();
+    let boundaries: Vec<u32> =
+        parts.frames.iter().zip(0..).filter(|(frame, _)| frame.boundary).map(|(_, at)| at).collect();
+    let frames = Span { begin: boundaries[4] - 2, end: boundaries[4] + 1 };
+    let body = BodyIndex(1);
+    parts.pushes = vec![Push { frames, body, impulse_ns: [0.0, 0.06, 0.0], toppled: vec![body] }];
+    let episode = Episode::new(parts).unwrap();
+    let read = read_back(&[Replay::from(&episode)]);
+    let [begin, end] = [i64::from(frames.begin), i64::from(frames.last())];
+    let name = &episode.scene.body(body).name;
+    assert_eq!(lane(read.only(), "/adversary"), [(begin, format!("pushes {name} #0")), (end, String::new())]);
+    let arrow = temporal(read.only(), "/world/adversary");
+    assert_eq!(times(arrow, "frame"), [begin, end]);
+    let component = rerun::Arrows3D::descriptor_origins().component;
+    let origins: Vec<Option<[f32; 3]>> =
+        arrow.iter_slices::<[f32; 3]>(component).map(|row| row.first().copied()).collect();
+    let stood: [f32; 3] = episode.frames[frames.begin as usize].state.body_in_world(body).translation.vector.into();
+    assert_eq!(origins, [Some(stood), None]);
+    let log = temporal(read.only(), "/calls");
+    let lines = log.iter_slices::<String>(rerun::TextLog::descriptor_text().component);
+    let told = format!("adversary: pushes {name} with 0.060 N s; {name} topples");
+    let at: Vec<i64> =
+        lines.zip(times(log, "frame")).filter(|(row, _)| row[0].as_str() == told).map(|(_, at)| at).collect();
+    assert_eq!(at, [begin]);
 }
 
 #[test]
@@ -340,7 +370,7 @@ fn bars(chunks: &[Chunk], entity: &str) -> Vec<Option<(f32, f32)>> {
 fn scopes_are_the_output_spans_on_the_boundary_frames_of_the_specification() {
     let (expert, shown, acted) = replays_of_a_tower();
     for (episode, demonstration) in [(&expert, None), (&acted, Some(&shown))] {
-        let read = read_back(&[Replay { episode, demonstration, divergence: None }]);
+        let read = read_back(&[Replay { episode, demonstration, divergence: None, cameras: &[] }]);
         let spans = if demonstration.is_none() { episode.clone().boundaries_only() } else { episode.clone() };
         for depth in 0..3_u8 {
             let entity = format!("/specification/scope/depth_{depth}");
@@ -372,7 +402,10 @@ fn probabilities_are_those_of_the_decisions() {
 #[test]
 fn the_same_replays_give_the_same_bytes() {
     let (expert, shown, acted) = replays_of_a_tower();
-    let replays = [Replay::from(&expert), Replay { episode: &acted, demonstration: Some(&shown), divergence: None }];
+    let replays = [
+        Replay::from(&expert),
+        Replay { episode: &acted, demonstration: Some(&shown), divergence: None, cameras: &[] },
+    ];
     let (first, second) = (read_back(&replays), read_back(&replays));
     let (first, second) = (std::fs::read(&first.path).unwrap(), std::fs::read(&second.path).unwrap());
     let first_difference = first.iter().zip(&second).position(|(a, b)| a != b);
@@ -494,7 +527,7 @@ fn a_demonstration_of_another_length_is_refused_by_number() {
     let foreign = demonstration(&other, &trial(&other, 0, 1), 3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("episode.rrd");
-    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None }];
+    let replays = [Replay { episode: &acted, demonstration: Some(&foreign), divergence: None, cameras: &[] }];
     let error = save_replays(&replays, &path).unwrap_err();
     let expected = "episode 42 was given a specification of 13 frames, but the demonstration to show beside it \
                     (episode 3) has 5 boundary frames";

@@ -6,35 +6,28 @@ use crate::artifact::read_json;
 use crate::dataset::DatasetError;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::Info;
-use crate::dataset::layout::{self, FilePlace};
-use crate::dataset::pictures::{PREFIX, video_columns};
-use crate::dataset::schema::{FRAMES, META_EPISODES};
-use crate::table::{self, Columns};
-use crate::video::{H264Decoder, Mp4Reader, Rgb, VideoError, decode_png};
+use crate::dataset::layout;
+use crate::dataset::pictures::PREFIX;
+use crate::dataset::pictures::open_files::OpenFiles;
+use crate::dataset::pictures::places::{Place, places};
+use crate::dataset::schema::FRAMES;
+use crate::table::{PictureReader, TableError};
+use crate::video::{Mp4Pictures, Mp4Reader, Rgb, VideoError, decode_png};
 
-/// The pictures of one camera of a dataset. Memory holds where each episode is, and the pictures of one episode.
+/// The pictures of one camera of a dataset, any episode in any order. Memory holds where each episode is, and the
+/// footers of the files that were read last.
 pub struct EpisodePictures {
     root: PathBuf,
     feature: String,
     size_px: [u32; 2],
     episodes: Vec<Place>,
-    /// `None` for images in the tables.
-    video: Option<OpenVideo>,
+    files: Files,
 }
 
-/// Where the pictures of an episode are.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    file: FilePlace,
-    /// Of the file: its row, or its sample.
-    first: usize,
-    count: usize,
-}
-
-#[derive(Default)]
-struct OpenVideo {
-    open: Option<(FilePlace, Mp4Reader)>,
-    packet: Vec<u8>,
+/// How pictures are stored, with the files that are open.
+enum Files {
+    Images(OpenFiles<PictureReader>),
+    Videos(OpenFiles<Mp4Reader>),
 }
 
 impl EpisodePictures {
@@ -76,9 +69,10 @@ impl EpisodePictures {
             let problem = format!("{feature} has shape {:?}, expected [height, width, 3]", declared.shape);
             return Err(DatasetError::Count { path, problem });
         };
-        let video = (declared.dtype == Dtype::Video).then(OpenVideo::default);
-        let episodes = places(root, &feature, video.is_some(), f64::from(info.fps), info.total_episodes)?;
-        Ok(Self { root: root.to_owned(), feature, size_px: [width as u32, height as u32], episodes, video })
+        let is_video = declared.dtype == Dtype::Video;
+        let episodes = places(root, &feature, is_video, f64::from(info.fps), info.total_episodes)?;
+        let files = if is_video { Files::Videos(OpenFiles::default()) } else { Files::Images(OpenFiles::default()) };
+        Ok(Self { root: root.to_owned(), feature, size_px: [width as u32, height as u32], episodes, files })
     }
 
     /// Width and height, in pixels.
@@ -91,7 +85,7 @@ impl EpisodePictures {
         self.episodes.len()
     }
 
-    /// How many pictures an episode has; none for one that is not there.
+    /// How many pictures an episode has, one a row; none for one that is not there.
     pub fn n_pictures(&self, episode: usize) -> usize {
         self.episodes.get(episode).map_or(0, |place| place.count)
     }
@@ -100,162 +94,115 @@ impl EpisodePictures {
     ///
     /// # Errors
     ///
-    /// With episode and camera, when a file cannot be read or a picture cannot be decoded or has another size.
+    /// As [`EpisodePictures::visit`].
     pub fn read(&mut self, episode: usize) -> Result<Vec<Rgb>, DatasetError> {
-        let count = self.n_pictures(episode);
-        let mut pictures = Vec::with_capacity(count);
-        self.each(episode, |_, picture| pictures.push(picture.clone()))?;
+        let rows = self.rows(episode)?;
+        let mut pictures = Vec::with_capacity(rows.len());
+        self.visit(episode, &rows, |picture| pictures.push(picture.clone()))?;
         Ok(pictures)
     }
 
-    /// Gives the pictures of an episode to `visit` one after the other, with their numbers.
+    /// Gives the pictures of some rows of an episode, in rising order, to `visit` one after the other.
     ///
     /// # Errors
     ///
-    /// As [`EpisodePictures::read`].
-    pub fn each(&mut self, episode: usize, mut visit: impl FnMut(usize, &Rgb)) -> Result<(), DatasetError> {
-        let (feature, expected) = (self.feature.clone(), self.size_px);
-        let n_episodes = self.episodes.len();
-        let path = self.path_of(episode);
-        let problem = |problem: String| DatasetError::Episode {
-            path: path.clone(),
-            episode: episode as i64,
-            problem: format!("{feature}: {problem}"),
+    /// With episode, camera and row, when a file cannot be read, or a picture is not there, cannot be decoded or has
+    /// another size.
+    pub fn visit(&mut self, episode: usize, rows: &[u32], mut visit: impl FnMut(&Rgb)) -> Result<(), DatasetError> {
+        let (place, path) = self.find(episode, rows)?;
+        let Self { feature, size_px: expected, files, .. } = self;
+        let wrong = |problem: String| {
+            let problem = format!("{feature}: {problem}");
+            DatasetError::Episode { path: path.clone(), episode: episode as i64, problem }
         };
-        let place = *self.episodes.get(episode).ok_or_else(|| problem(format!("there are {n_episodes} episodes")))?;
-        let mut checked = |number: usize, picture: &Rgb| {
-            if picture.size_px != expected {
-                return Err(VideoError::Size { found: picture.size_px, expected });
-            }
-            visit(number, picture);
-            Ok(())
+        let wrong_row = |row: u32| {
+            let wrong = &wrong;
+            move |error: VideoError| wrong(format!("picture of row {row}: {error}"))
         };
-        let failed = |error: VideoError| problem(error.to_string());
-        match &mut self.video {
-            None => {
-                let rows = place.first..place.first + place.count;
-                for (number, png) in table::read_pictures(&path, &FRAMES, &feature, rows)?.iter().enumerate() {
-                    decode_png(png).and_then(|picture| checked(number, &picture)).map_err(failed)?;
+        match files {
+            Files::Images(files) => {
+                let open = || PictureReader::open(&path, &FRAMES, feature);
+                let file = files.get(place.file, open).map_err(|error| wrong(error.to_string()))?;
+                let of_file: Vec<usize> = rows.iter().map(|&row| place.first.saturating_add(row as usize)).collect();
+                let encoded = file.read(&of_file).map_err(|error| wrong(words(&error)))?;
+                for (&row, png) in rows.iter().zip(&encoded) {
+                    let picture = decode_png(png).map_err(wrong_row(row))?;
+                    check_size(&picture, *expected).map_err(wrong_row(row))?;
+                    visit(&picture);
                 }
             }
-            Some(video) => video.each(&path, place, &mut checked).map_err(failed)?,
+            Files::Videos(files) => {
+                let file =
+                    files.get(place.file, || Mp4Reader::open(&path)).map_err(|error| wrong(error.to_string()))?;
+                let mut video = Mp4Pictures::new(file).map_err(|error| wrong(error.to_string()))?;
+                for &row in rows {
+                    let picture = video.get(place.first.saturating_add(row as usize)).map_err(wrong_row(row))?;
+                    check_size(picture, *expected).map_err(wrong_row(row))?;
+                    visit(picture);
+                }
+            }
         }
         Ok(())
+    }
+
+    /// Makes sure that an episode has pictures of some rows, without reading them.
+    ///
+    /// # Errors
+    ///
+    /// With episode and camera, for the first row without a picture.
+    pub fn check_rows(&self, episode: usize, rows: &[u32]) -> Result<(), DatasetError> {
+        self.find(episode, rows).map(|_| ())
     }
 
     /// Decodes the first and the last picture of an episode, and of a video what is between.
     ///
     /// # Errors
     ///
-    /// As [`EpisodePictures::read`].
+    /// As [`EpisodePictures::visit`].
     pub fn check_ends(&mut self, episode: usize) -> Result<(), DatasetError> {
-        let Some(&whole) = self.episodes.get(episode) else { return Ok(()) };
-        if self.video.is_some() || whole.count == 0 {
-            return self.each(episode, |_, _| {});
-        }
-        for row in [whole.first, whole.first + whole.count - 1] {
-            self.episodes[episode] = Place { first: row, count: 1, ..whole };
-            let checked = self.each(episode, |_, _| {});
-            self.episodes[episode] = whole;
-            checked?;
-        }
-        Ok(())
-    }
-
-    fn path_of(&self, episode: usize) -> PathBuf {
-        let file = self.episodes.get(episode).map_or(FilePlace::default(), |place| place.file);
-        match self.video {
-            None => file.in_dataset(&self.root, layout::DATA),
-            Some(_) => self.root.join(file.video(&self.feature)),
-        }
-    }
-}
-
-impl OpenVideo {
-    fn each(
-        &mut self,
-        path: &Path,
-        place: Place,
-        visit: &mut impl FnMut(usize, &Rgb) -> Result<(), VideoError>,
-    ) -> Result<(), VideoError> {
-        let reader = match self.open.take() {
-            Some(open) if open.0 == place.file => self.open.insert(open),
-            _ => self.open.insert((place.file, Mp4Reader::open(path)?)),
+        let rows = match (&self.files, self.n_pictures(episode) as u32) {
+            (Files::Images(_), n_pictures @ 3..) => vec![0, n_pictures - 1],
+            (Files::Images(_) | Files::Videos(_), _) => self.rows(episode)?,
         };
-        let mut decoder = H264Decoder::new()?;
-        let mut picture = Rgb::default();
-        for number in 0..place.count {
-            reader.1.read(place.first + number, &mut self.packet)?;
-            decoder.decode(&self.packet, &mut picture)?;
-            visit(number, &picture)?;
-        }
-        Ok(())
+        self.visit(episode, &rows, |_| {})
     }
-}
 
-/// Where the pictures of all episodes are.
-fn places(root: &Path, feature: &str, is_video: bool, fps: f64, n_episodes: u64) -> Result<Vec<Place>, DatasetError> {
-    let mut places = Vec::new();
-    let mut file = FilePlace::default();
-    while (places.len() as u64) < n_episodes {
-        let path = file.in_dataset(root, layout::META_EPISODES);
-        let mut columns = table::read(&path, &META_EPISODES)?;
-        let lengths = columns.int64("length")?;
-        let of_file = if is_video {
-            video_places(table::read_further(&path, &META_EPISODES, &video_columns(feature))?, feature, &lengths, fps)?
-        } else {
-            image_places(columns, &lengths)?
+    /// All rows of an episode. The last one is read first: a length that is not true must not fill the memory.
+    fn rows(&mut self, episode: usize) -> Result<Vec<u32>, DatasetError> {
+        let n_pictures = self.n_pictures(episode) as u32;
+        self.visit(episode, &n_pictures.checked_sub(1).map_or(Vec::new(), |last| vec![last]), |_| {})?;
+        Ok((0..n_pictures).collect())
+    }
+
+    /// Where an episode with certain rows is, and the path of the file.
+    fn find(&self, episode: usize, rows: &[u32]) -> Result<(Place, PathBuf), DatasetError> {
+        let (place, n_episodes) = (self.episodes.get(episode), self.episodes.len());
+        let file = place.map(|place| place.file).unwrap_or_default();
+        let path = match self.files {
+            Files::Images(_) => file.in_dataset(&self.root, layout::DATA),
+            Files::Videos(_) => self.root.join(file.video(&self.feature)),
         };
-        if of_file.is_empty() {
-            let problem = format!("it ends after {} of {n_episodes} episodes", places.len());
-            return Err(DatasetError::Count { path, problem });
-        }
-        places.extend(of_file);
-        file = file.next();
-    }
-    if !is_video {
-        count_rows_of_files(&mut places);
-    }
-    Ok(places)
-}
-
-fn numbers(chunk: i64, file: i64) -> FilePlace {
-    FilePlace { chunk: chunk.try_into().unwrap_or(u32::MAX), file: file.try_into().unwrap_or(u32::MAX) }
-}
-
-fn image_places(mut columns: Columns, lengths: &[i64]) -> Result<Vec<Place>, DatasetError> {
-    let (chunks, files) = (columns.int64("data/chunk_index")?, columns.int64("data/file_index")?);
-    let first = columns.int64("dataset_from_index")?;
-    let rows = chunks.into_iter().zip(files).zip(first).zip(lengths);
-    Ok(rows
-        .map(|(((chunk, file), first), &length)| Place {
-            file: numbers(chunk, file),
-            first: usize::try_from(first).unwrap_or(usize::MAX),
-            count: usize::try_from(length).unwrap_or(0),
-        })
-        .collect())
-}
-
-/// From rows of the dataset to rows of each file.
-fn count_rows_of_files(places: &mut [Place]) {
-    let mut begin = (FilePlace::default(), 0);
-    for place in places {
-        if place.file != begin.0 {
-            begin = (place.file, place.first);
-        }
-        place.first = place.first.saturating_sub(begin.1);
+        let problem = match place {
+            None => format!("there are {n_episodes} episodes"),
+            Some(place) => match rows.iter().find(|&&row| row as usize >= place.count) {
+                None => return Ok((*place, path)),
+                Some(row) => format!("row {row} has no picture, there are {} rows", place.count),
+            },
+        };
+        let problem = format!("{}: {problem}", self.feature);
+        Err(DatasetError::Episode { path, episode: episode as i64, problem })
     }
 }
 
-fn video_places(mut columns: Columns, feature: &str, lengths: &[i64], fps: f64) -> Result<Vec<Place>, DatasetError> {
-    let [chunk, file, from, _] = video_columns(feature).map(|(name, _)| name);
-    let (chunks, files, from) = (columns.int64(&chunk)?, columns.int64(&file)?, columns.float64(&from)?);
-    let rows = chunks.into_iter().zip(files).zip(from).zip(lengths);
-    Ok(rows
-        .map(|(((chunk, file), from), &length)| Place {
-            file: numbers(chunk, file),
-            first: (from * fps).round() as usize,
-            count: usize::try_from(length).unwrap_or(0),
-        })
-        .collect())
+fn check_size(picture: &Rgb, expected: [u32; 2]) -> Result<(), VideoError> {
+    let found = picture.size_px;
+    if found == expected { Ok(()) } else { Err(VideoError::Size { found, expected }) }
+}
+
+/// What is wrong with a table, whose path stands before it.
+fn words(error: &TableError) -> String {
+    match error {
+        TableError::Null { row, .. } => format!("row {row} of the file has no picture"),
+        other => other.to_string(),
+    }
 }

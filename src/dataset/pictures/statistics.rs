@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::table::Values;
 use crate::video::Rgb;
 
 /// As `meta/stats.json` has them: `[3][1][1]`, in 0 to 1. `count` is of frames.
@@ -20,6 +21,53 @@ pub(crate) struct PictureStatistics {
 }
 
 type Channels = [[[f64; 1]; 1]; 3];
+
+/// Statistics of each episode that is not yet written: columns of `meta/episodes/`, which `LeRobot`'s tools sum up when
+/// they merge, split or cut datasets. Quantiles are left out, as of numbers.
+pub(super) struct EpisodeStatistics {
+    columns: [String; 5],
+    /// Minimum, maximum, mean and deviation.
+    channels: [Vec<[f64; 3]>; 4],
+    counts: Vec<i64>,
+}
+
+impl EpisodeStatistics {
+    pub(super) fn new(feature: &str) -> Self {
+        let columns = ["min", "max", "mean", "std", "count"].map(|name| format!("stats/{feature}/{name}"));
+        Self { columns, channels: Default::default(), counts: Vec::new() }
+    }
+
+    /// The columns as lines of the schema's text.
+    pub(super) fn schema(&self) -> impl Iterator<Item = String> {
+        let list = |name: &str, element: String| {
+            format!("required group {name} (LIST) {{ repeated group list {{ {element} }} }}")
+        };
+        let [channels @ .., count] = &self.columns;
+        let channels = channels.iter().map(move |name| {
+            let inner = list("element", list("element", "required double element;".to_owned()));
+            format!("  {}\n", list(name, inner))
+        });
+        channels.chain([format!("  {}\n", list(count, "required int64 element;".to_owned()))])
+    }
+
+    pub(super) fn append(&mut self, episode: PictureStatistics) {
+        let PictureStatistics { min, max, mean, std, count, .. } = episode;
+        for (column, value) in self.channels.iter_mut().zip([min, max, mean, std]) {
+            column.push(value.map(|[[value]]| value));
+        }
+        self.counts.push(count[0] as i64);
+    }
+
+    pub(super) fn columns(&self) -> impl Iterator<Item = (&str, Values<'_>)> {
+        let channels = self.channels.iter().map(|rows| Values::Channels(rows));
+        self.columns.iter().map(String::as_str).zip(channels.chain([Values::Int64Vector(&self.counts, 1)]))
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.channels.iter_mut().for_each(Vec::clear);
+        self.counts.clear();
+    }
+}
 
 /// How often each channel has had each value.
 #[derive(Debug)]
@@ -46,8 +94,8 @@ impl Histogram {
 
     pub(super) fn merge(&mut self, other: &Self) {
         self.n_pictures += other.n_pictures;
-        let pairs = self.counts.iter_mut().flatten().zip(other.counts.iter().flatten());
-        pairs.for_each(|(count, other)| *count += other);
+        let counts = self.counts.as_flattened_mut().iter_mut().zip(other.counts.as_flattened());
+        counts.for_each(|(sum, count)| *sum += count);
     }
 
     pub(super) fn statistics(&self) -> PictureStatistics {

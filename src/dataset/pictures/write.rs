@@ -7,10 +7,11 @@ use crate::dataset::config::ConvertConfig;
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::Dtype;
 use crate::dataset::info::{CameraInfo, FeatureInfo};
+use crate::dataset::pictures::statistics::EpisodeStatistics;
 use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
 use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
-use crate::table::Values;
+use crate::table::{ColumnKind, Value, Values};
 use crate::video::VideoError;
 
 /// Bytes of pictures that make a row group, at least.
@@ -30,6 +31,7 @@ struct PictureFeature {
     camera: String,
     size_px: [u32; 2],
     store: Store,
+    episodes: EpisodeStatistics,
     measure: PictureMeasure,
 }
 
@@ -53,7 +55,8 @@ impl PictureFeatures {
                 }
             };
             let (camera, size_px) = (pictures.camera.clone(), pictures.size_px);
-            PictureFeature { name, camera, size_px, store, measure: PictureMeasure::new(size_px) }
+            let (episodes, measure) = (EpisodeStatistics::new(&name), PictureMeasure::new(size_px));
+            PictureFeature { name, camera, size_px, store, episodes, measure }
         };
         Self { features: cameras.iter().map(feature).collect(), fps }
     }
@@ -70,14 +73,18 @@ impl PictureFeatures {
 
     /// Further columns of `meta/episodes/`.
     pub(in crate::dataset) fn meta_schema(&self) -> Vec<String> {
-        let videos = self.features.iter().filter(|feature| matches!(feature.store, Store::Videos(_)));
-        let columns = videos.flat_map(|feature| video_columns(&feature.name));
-        columns
-            .map(|(name, kind)| {
-                let physical = if kind.value == crate::table::Value::Int64 { "int64" } else { "double" };
-                format!("  required {physical} {name};\n")
-            })
-            .collect()
+        let place = |(name, kind): (String, ColumnKind)| {
+            let physical = if kind.value == Value::Int64 { "int64" } else { "double" };
+            format!("  required {physical} {name};\n")
+        };
+        let of_feature = |feature: &PictureFeature| {
+            let places = match feature.store {
+                Store::Column(_) => Vec::new(),
+                Store::Videos(_) => video_columns(&feature.name).map(place).into(),
+            };
+            places.into_iter().chain(feature.episodes.schema()).collect::<Vec<_>>()
+        };
+        self.features.iter().flat_map(of_feature).collect()
     }
 
     /// Adds an episode's pictures, those of the frames that become rows.
@@ -116,11 +123,13 @@ impl PictureFeatures {
 
     /// The columns of `meta/episodes/`.
     pub(in crate::dataset) fn meta_columns(&self) -> impl Iterator<Item = (&str, Values<'_>)> {
-        let videos = self.features.iter().filter_map(|feature| match &feature.store {
-            Store::Column(_) => None,
-            Store::Videos(videos) => Some(videos.columns()),
-        });
-        videos.flatten()
+        self.features.iter().flat_map(|feature| {
+            let videos = match &feature.store {
+                Store::Column(_) => None,
+                Store::Videos(videos) => Some(videos.columns()),
+            };
+            videos.into_iter().flatten().chain(feature.episodes.columns())
+        })
     }
 
     /// Whether rows should be written before there are more.
@@ -144,6 +153,7 @@ impl PictureFeatures {
     /// Forgets the rows of `meta/episodes/`.
     pub(in crate::dataset) fn clear_episodes(&mut self) {
         for feature in &mut self.features {
+            feature.episodes.clear();
             if let Store::Videos(videos) = &mut feature.store {
                 videos.clear();
             }
@@ -195,16 +205,19 @@ impl PictureFeature {
 
     /// Adds an episode's pictures; each is decoded, for the statistics and so that none is written that is damaged.
     fn append(&mut self, rows: &[&Vec<u8>]) -> Result<(), VideoError> {
+        let mut episode = PictureMeasure::new(self.size_px);
         match &mut self.store {
             Store::Column(column) => {
-                rows.iter().try_for_each(|row| self.measure.add_png(row))?;
+                rows.iter().try_for_each(|row| episode.add_png(row))?;
                 column.extend(rows.iter().map(|row| (*row).clone()));
             }
             Store::Videos(videos) => {
-                self.measure.add_video(rows.iter().copied())?;
+                episode.add_video(rows.iter().copied())?;
                 videos.append(rows)?;
             }
         }
+        self.measure.merge(&episode);
+        self.episodes.append(episode.statistics());
         Ok(())
     }
 

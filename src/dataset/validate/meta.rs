@@ -254,9 +254,9 @@ fn episode_statistics_problems(
     let mut list = |name: &str| batch.double_rows(&format!("stats/{feature}/{name}"));
     let (min, mean, max, std) = (list("min")?, list("mean")?, list("max")?, list("std")?);
     let mut problems = Vec::new();
-    for row in 0..lengths.len() {
-        if count.row(row) != [lengths[row]] {
-            problems.push((row, format!("count is {:?}, but the episode has {} frames", count.row(row), lengths[row])));
+    for (row, &length) in lengths.iter().enumerate() {
+        if count.row(row) != [length] {
+            problems.push((row, format!("count is {:?}, but the episode has {length} frames", count.row(row))));
         }
         let (min, mean, max, std) = (min.row(row), mean.row(row), max.row(row), std.row(row));
         let is_ordered = [mean.len(), max.len(), std.len()] == [min.len(); 3]

@@ -1,17 +1,44 @@
-//! A detector on colour slots: where each colour lies in the picture, how much of it there is, and how the others lie
-//! to it, tell where its object is.
+//! A detector on colour slots: where each colour is densest in the picture, how much of it there is, how the others lie to
+//! it and what surrounds it tell where its object is.
+//!
+//! ```text
+//! colour slots ─► place, mass, spread ──┐
+//!     │              └─► pairs ─────────┼─► position of each thing ──┐
+//!     └─► patch about each place ───────┘                            ├─► difference
+//!         patch about the robot ──────────► position of the gripper ─┘
+//! ```
+//!
+//! Colours are found, and slots told by them, before the first step; they are not learned further. A patch shows what hides a thing, on what it stands and where its edges lie, which moments of its visible part do
+//! not. All things share their weights but for a bias; things and gripper are placed by themselves, since where a thing
+//! is does not depend on where the gripper is.
+//!
+//! # Source
+//!
+//! Ours, beyond the paper.
 
-use burn::module::Module;
+use burn::module::{Module, Param};
 use burn::nn::Linear;
-use burn::tensor::Tensor;
+use burn::tensor::activation::relu;
+use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
-use crate::model::colour_slots::{ColourSlots, ColourSlotsConfig};
+use crate::model::colour_slots::{ColourSlots, ColourSlotsConfig, FIND_WIDTH, Find, Finder};
 use crate::model::detector::Detector;
+use crate::model::detector::assignment::colours_of_slots;
+use crate::model::detector::patches::{CHANNELS, Claimed};
 use crate::model::layers::{Init, Mlp};
-use crate::model::perception::{PERCEPT_WIDTH, Perception as _};
+use crate::model::perception::Perception as _;
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::seed::Seed;
+
+/// What a find tells by itself: its numbers and three products of its place.
+const LOOK_WIDTH: usize = FIND_WIDTH + 3;
+/// Places, from -1 to 1 across and down the picture, are scaled so that neighbouring things differ by about one.
+const PLACE_GAIN: f32 = 3.0;
+/// Pixels that make a mass of one, as a share of the picture: a block.
+const MASS_SHARE: f32 = 1.0 / 128.0;
+/// Pixels that make a spread of one, as a share of the picture's width: about a block's.
+const SPREAD_SHARE: f32 = 1.0 / 32.0;
 
 /// Sizes of the detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,61 +46,170 @@ use crate::seed::Seed;
 pub struct PointDetectorConfig {
     /// Of its colour slots.
     pub perception: ColourSlotsConfig,
-    /// Features of a percept. Default 48.
+    /// Features of a percept. Default 64.
     pub width: usize,
     /// Features of a pair of percepts. Default 16.
     pub pair_width: usize,
+    /// Pixels across and down a thing's patch. Default a quarter of the picture.
+    pub patch: usize,
+    /// Pixels across and down the gripper's patch, which holds its shadow too: where that lies tells how high the gripper is.
+    /// Default half of the picture.
+    pub gripper_patch: usize,
 }
 
 impl PointDetectorConfig {
     /// The default widths with colour slots.
     pub fn of(perception: ColourSlotsConfig) -> Self {
-        Self { perception, width: 48, pair_width: 16 }
+        let pixels = perception.pixels;
+        Self { perception, width: 64, pair_width: 16, patch: pixels / 4, gripper_patch: pixels / 2 }
     }
 }
 
-/// Colour slots, their pairs, and what they tell.
+/// Colour slots, their patches and pairs, and what they tell.
 #[derive(Module, Debug)]
 pub struct PointDetector {
     perception: ColourSlots,
+    n_slots: usize,
+    patch: usize,
+    gripper_patch: usize,
     pairs: Mlp,
-    percepts: Mlp,
-    positions: Linear,
+    surroundings: Mlp,
+    thing: Linear,
+    /// `[N, width]`: what is known of a slot whatever is seen.
+    slots: Param<Tensor<2>>,
+    hidden: Mlp,
+    position: Linear,
     /// The main part of a position is linear in its place in the picture.
-    places: Linear,
+    place: Linear,
+    /// `[N, 3]`
+    slot_positions: Param<Tensor<2>>,
+    gripper_surroundings: Mlp,
+    gripper: Mlp,
+    gripper_position: Linear,
+    gripper_place: Linear,
+}
+
+/// A find as numbers of about one, with products of its place.
+fn told(find: &Find, pictures: &Pictures) -> [f32; LOOK_WIDTH] {
+    let pixels = [pictures.width as f32, pictures.height as f32];
+    let [x, y] = [0, 1].map(|axis| PLACE_GAIN * (2.0 * find.centre[axis] / pixels[axis] - 1.0));
+    let mass = |pixels_claimed: f32| pixels_claimed / (MASS_SHARE * pixels[0] * pixels[1]);
+    let spread = find.spread.map(|deviation| deviation / (SPREAD_SHARE * pixels[0]));
+    [x, y, mass(find.mass), spread[0], spread[1], mass(find.elsewhere), x * y, x * x, y * y]
+}
+
+/// What is seen of some pictures before anything is told of it, the robot first.
+struct Looks {
+    /// `[F, N + 1, LOOK_WIDTH]`
+    looks: Tensor<3>,
+    /// `[F, N, patch]`
+    patches: Tensor<3>,
+    /// `[F, patch]`
+    gripper_patch: Tensor<2>,
+}
+
+impl PointDetector {
+    fn look(&self, pictures: &Pictures) -> Looks {
+        let device = self.place.weight.device();
+        let claims = self.perception.claims(pictures);
+        let claimed = Claimed { pictures, claims: &claims, n_things: self.n_slots };
+        let mut finder = Finder::new(pictures.width, pictures.height);
+        let n_percepts = self.n_slots + 1;
+        let mut looks = vec![0.0; pictures.n * n_percepts * LOOK_WIDTH];
+        let mut patches = Vec::with_capacity(n_percepts);
+        for slot in 0..n_percepts {
+            let (side, window) =
+                if slot == 0 { (self.gripper_patch, 3 * self.gripper_patch / 8) } else { (self.patch, self.patch / 2) };
+            let finds: Vec<Find> = (0..pictures.n).map(|picture| finder.find(&claims, picture, slot, window)).collect();
+            for (picture, find) in finds.iter().enumerate() {
+                let at = (picture * n_percepts + slot) * LOOK_WIDTH;
+                looks[at..at + LOOK_WIDTH].copy_from_slice(&told(find, pictures));
+            }
+            let centres: Vec<[f32; 2]> = finds.iter().map(|find| find.centre).collect();
+            let shape = [pictures.n, 1, side * side * CHANNELS];
+            let patch = TensorData::new(claimed.patches(slot, &centres, side), shape);
+            patches.push(Tensor::<3>::from_data(patch, &device));
+        }
+        let looks = TensorData::new(looks, [pictures.n, n_percepts, LOOK_WIDTH]);
+        let gripper_patch = patches.remove(0).flatten::<2>(1, 2);
+        Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1), gripper_patch }
+    }
+
+    /// The most that the other slots and the robot tell of each thing by where they lie to it: `[F, N, pair]`.
+    fn relations(&self, looks: &Tensor<3>) -> Tensor<3> {
+        let [n_pictures, _, width] = looks.dims();
+        let n_others = self.n_slots + 1;
+        let all = [n_pictures, self.n_slots, n_others, width];
+        let own: Tensor<4> = looks.clone().narrow(1, 1, self.n_slots).unsqueeze_dim::<4>(2).expand(all);
+        let others: Tensor<4> = looks.clone().narrow(1, 0, n_others).unsqueeze_dim::<4>(1).expand(all);
+        let pairs = self.pairs.forward(Tensor::<4>::cat(vec![others.clone() - own, others], 3));
+        pairs.max_dim(2).squeeze_dim(2)
+    }
+
+    /// Positions of all things in decimetres from a point that is the gripper's too: `[F, N, 3]`.
+    fn things(&self, seen: &Looks) -> Tensor<3> {
+        let looks = seen.looks.clone().narrow(1, 1, self.n_slots);
+        let surroundings = self.surroundings.forward(seen.patches.clone());
+        let told = Tensor::<3>::cat(vec![surroundings, looks.clone(), self.relations(&seen.looks)], 2);
+        let hidden = relu(self.thing.forward(told) + self.slots.val().unsqueeze_dim::<3>(0));
+        let position = self.position.forward(self.hidden.forward(hidden));
+        position + self.place.forward(looks) + self.slot_positions.val().unsqueeze_dim::<3>(0)
+    }
+
+    /// Position of the gripper, and the logit that it is closed: `[F, 4]`.
+    fn gripper(&self, seen: &Looks) -> Tensor<2> {
+        let look: Tensor<2> = seen.looks.clone().narrow(1, 0, 1).squeeze_dim(1);
+        let surroundings = self.gripper_surroundings.forward(seen.gripper_patch.clone());
+        let hidden = self.gripper.forward(Tensor::cat(vec![surroundings, look.clone()], 1));
+        self.gripper_position.forward(hidden) + self.gripper_place.forward(look)
+    }
 }
 
 impl Detector for PointDetector {
     type Config = PointDetectorConfig;
 
     fn new(config: &PointDetectorConfig, n_slots: usize, init: &mut Init) -> Self {
-        let &PointDetectorConfig { perception, width, pair_width } = config;
-        let n_percepts = perception.colours;
-        let n_outputs = 3 * n_slots + 1;
+        let &PointDetectorConfig { perception, width, pair_width, patch, gripper_patch } = config;
+        let n_told = width + LOOK_WIDTH + pair_width;
         Self {
             perception: ColourSlots::new(&perception, init),
-            pairs: init.mlp(&[2 * PERCEPT_WIDTH, pair_width, pair_width]),
-            percepts: init.mlp(&[pair_width + 2 * PERCEPT_WIDTH, width, width]),
-            positions: init.linear(n_percepts * width, n_outputs),
-            places: init.linear(n_percepts * PERCEPT_WIDTH, n_outputs),
+            n_slots,
+            patch,
+            gripper_patch,
+            pairs: init.mlp(&[2 * LOOK_WIDTH, pair_width, pair_width]),
+            surroundings: init.mlp(&[patch * patch * CHANNELS, width, width]),
+            thing: init.linear(n_told, width),
+            slots: init.filled([n_slots, width], 0.0),
+            hidden: init.mlp(&[width, width]),
+            position: init.linear(width, 3),
+            place: init.linear(LOOK_WIDTH, 3),
+            slot_positions: init.filled([n_slots, 3], 0.0),
+            gripper_surroundings: init.mlp(&[gripper_patch * gripper_patch * CHANNELS, width, width]),
+            gripper: init.mlp(&[width + LOOK_WIDTH, width]),
+            gripper_position: init.linear(width, 4),
+            gripper_place: init.linear(LOOK_WIDTH, 4),
         }
     }
 
-    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
+    fn acquainted(mut self, sample: &PictureSample, rows: &[f32], seed: Seed) -> Self {
         self.perception = self.perception.acquainted(sample, seed);
+        let (looks, ()) = self.perception.look(&sample.pictures);
+        let [_, n_colours, width] = looks.dims();
+        let looks: Vec<f32> = looks.into_data().try_into_vec().unwrap_or_default();
+        let colours = colours_of_slots(&looks, [n_colours, width], rows, self.n_slots);
+        self.perception = self.perception.with_first(&colours);
         self
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let seen = self.perception.look(pictures) * 3.0; // [F, K, PERCEPT_WIDTH]
-        let [n_pictures, n_percepts, width] = seen.dims();
-        let all = [n_pictures, n_percepts, n_percepts, width];
-        let own: Tensor<4> = seen.clone().unsqueeze_dim::<4>(2).expand(all);
-        let others: Tensor<4> = seen.clone().unsqueeze_dim::<4>(1).expand(all);
-        let pairs = self.pairs.forward(Tensor::<4>::cat(vec![others.clone() - own, others], 3));
-        let pairs: Tensor<3> = pairs.max_dim(2).squeeze_dim(2); // [F, K, pair]
-        let robot = seen.clone().narrow(1, 0, 1).expand([n_pictures, n_percepts, width]);
-        let percepts = self.percepts.forward(Tensor::<3>::cat(vec![pairs, seen.clone(), robot], 2));
-        self.positions.forward(percepts.flatten::<2>(1, 2)) + self.places.forward(seen.flatten::<2>(1, 2))
+        let seen = self.look(pictures);
+        let things = self.things(&seen);
+        let gripper = self.gripper(&seen);
+        let positions = things - gripper.clone().narrow(1, 0, 3).unsqueeze_dim::<3>(1);
+        Tensor::cat(vec![positions.flatten::<2>(1, 2), gripper.narrow(1, 3, 1)], 1)
+    }
+
+    fn device(&self) -> Device {
+        self.place.weight.device()
     }
 }

@@ -10,7 +10,7 @@ use burn::nn::conv::Conv2d;
 use burn::nn::pool::MaxPool2dConfig;
 use burn::nn::{Linear, PaddingConfig2d};
 use burn::tensor::activation::relu;
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::detector::Detector;
@@ -28,8 +28,17 @@ const TOP: usize = 4096;
 pub struct VggDetectorConfig {
     /// Pixels across and down a picture; the paper's are 224.
     pub pixels: usize,
-    /// What the widths of VGG16 are divided by: 1 is full width. Default 8.
+    /// What the widths of VGG16 are divided by: 1 is full width. Default [`VggDetectorConfig::NARROWED`].
     pub narrowed: usize,
+}
+
+impl VggDetectorConfig {
+    /// An eighth of the full width, which a CPU can train.
+    pub const NARROWED: usize = 8;
+    /// No layer is left at a greater one.
+    pub const MOST_NARROWED: usize = 64;
+    /// Five times halved, a picture must still have a pixel.
+    pub const LEAST_PIXELS: usize = 32;
 }
 
 /// VGG16's layers.
@@ -64,15 +73,16 @@ impl Detector for VggDetector {
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let values: Vec<f32> = pictures.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
-        let shape = [pictures.n, pictures.height, pictures.width, 3];
-        let device = self.positions.weight.device();
-        let rows = Tensor::<4>::from_data(TensorData::new(values, shape), &device);
+        let pixels = pictures.to_tensor(&self.positions.weight.device());
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
-        let seen = self.blocks.iter().fold(rows.permute([0, 3, 1, 2]), |seen, block| {
+        let seen = self.blocks.iter().fold(pixels, |seen, block| {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
             pool.forward(seen)
         });
         self.positions.forward(self.top.forward(seen.flatten::<2>(1, 3)))
+    }
+
+    fn device(&self) -> Device {
+        self.positions.weight.device()
     }
 }

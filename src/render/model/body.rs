@@ -1,22 +1,24 @@
 //! The meshes of bodies. Their forms are those of simulation, but a fork's, which is drawn within its box.
 
 use crate::geometry::Vec3;
-use crate::render::look::{linear, mixed};
+use crate::render::look::{Letters, linear, mixed};
 use crate::render::mesh::{Mesh, Paint, Print, Surface};
 use crate::render::texture::{self, Texture};
 use crate::scene::{Body, Bowl, Shape};
 
+/// Walls of bowls are thinner than the texels of a small picture's shadow map.
+const BOWL_SLACK: f32 = 0.75;
 /// Sides of round bodies.
 const N_SIDES: usize = 24;
 
-pub(super) fn mesh(body: &Body, rgb: [u8; 3], letters: bool) -> Mesh {
+pub(super) fn mesh(body: &Body, rgb: [u8; 3], letters: Letters) -> Mesh {
     let color = linear(rgb);
     let mut mesh = Mesh::default();
     match body.shape {
         Shape::Cuboid { half_extents_m } if body.name.starts_with("fork") => fork(&mut mesh, half_extents_m, color),
         Shape::Cuboid { half_extents_m } => {
-            let letter = letter_of(&body.name).filter(|_| letters);
-            block(&mut mesh, half_extents_m.into(), color, letter);
+            let print = letter_of(&body.name).and_then(|letter| texture::letter(letter, letters));
+            block(&mut mesh, half_extents_m.into(), color, print);
         }
         Shape::Cylinder { radius_m, half_height_m } => can(&mut mesh, radius_m, half_height_m, color),
         Shape::Ball { radius_m } => mesh.ball(radius_m, N_SIDES, Paint { color, gloss: 0.5 }),
@@ -32,11 +34,10 @@ fn letter_of(name: &str) -> Option<char> {
     letters.next().filter(|_| letters.next().is_none())
 }
 
-fn block(mesh: &mut Mesh, half: Vec3, color: [f32; 3], letter: Option<char>) {
+fn block(mesh: &mut Mesh, half: Vec3, color: [f32; 3], texture: Option<&'static Texture>) {
     let [red, green, blue] = color;
     let is_light = 0.2126 * red + 0.7152 * green + 0.0722 * blue > 0.28;
     let ink = if is_light { mixed(color, [0.01, 0.01, 0.02], 0.88) } else { [0.95, 0.94, 0.9] };
-    let texture = letter.and_then(texture::letter);
     mesh.cuboid(Vec3::zeros(), half, Paint { color, gloss: 0.0 }, |normal| {
         let print = |texture: &'static Texture| {
             let up = if normal.z.abs() > 0.5 { Vec3::y() } else { Vec3::z() };
@@ -110,6 +111,7 @@ fn open_box(mesh: &mut Mesh, [half_x, half_y, height]: [f32; 3], wall: f32, colo
 /// The bowl's prisms; walls and foot are shaded as if they were round.
 fn bowl(mesh: &mut Mesh, form: &Bowl, color: [f32; 3]) {
     let paint = Paint { color, gloss: 0.45 };
+    mesh.shadow_slack = BOWL_SLACK;
     let flare = (form.rim_radius_m - form.floor_radius_m) / form.height_m;
     let length = (1.0 + flare * flare).sqrt();
     let outside = Surface::Cone { radial: 1.0 / length, axial: -flare / length };

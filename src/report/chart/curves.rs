@@ -87,7 +87,7 @@ fn panel(curves: &[&Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel
         let last = curve.points.iter().rev().find_map(|point| point.losses[part])?;
         let tip = format!(
             "{}, {} tasks, training seed {}: {last:.4} in the end",
-            model_name(&model.variant, &model.specification),
+            model_name(&model.variant, &model.specification, model.tag.as_deref()),
             model.train_tasks,
             model.seed
         );

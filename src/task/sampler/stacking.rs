@@ -1,4 +1,4 @@
-//! Block Stacking: towers of two to four out of eight blocks.
+//! Block Stacking: towers of two to four out of eight blocks, or of the first few of them.
 //!
 //! # Source
 //!
@@ -9,8 +9,13 @@
 //! # Invariants
 //!
 //! There is one stream of tasks a seed, all with different end configurations. Training takes the even places of the
-//! stream, the unseen split the odd ones: neither depends on how many the other takes, and no leak is possible. A
-//! task's id is its place in the stream.
+//! stream, the unseen split the odd ones; a split that needs more goes on with the other's places from the stream's end.
+//! So neither depends on how many the other takes, and no leak is possible. A task's id is its place in the stream.
+//!
+//! # Shapes
+//!
+//! Fewer blocks leave the shapes that need no more than there are, in the same proportions until one is used up: four
+//! blocks have 72 end configurations, three 12, two 2.
 
 use std::collections::BTreeSet;
 
@@ -18,10 +23,9 @@ use rand::seq::SliceRandom as _;
 
 use crate::scene::SlotIndex;
 use crate::seed::Seed;
+use crate::task::layout::stacking::N_BLOCKS;
 use crate::task::sampler::task;
 use crate::task::{Family, Goal, Split, Task};
-
-const N_BLOCKS: u16 = 8;
 
 /// The heights of a task's towers, and how many of 2000 tasks have them.
 const SHAPES: [(&[usize], u32); 14] = [
@@ -41,46 +45,59 @@ const SHAPES: [(&[usize], u32); 14] = [
     (&[2, 2, 2, 2], 20),
 ];
 
-/// How many different end configurations there are with towers of these heights.
-fn n_configurations(heights: &[usize]) -> u32 {
-    let n_blocks = heights.iter().sum::<usize>() as u32;
-    let placings: u32 = (0..n_blocks).map(|placed| u32::from(N_BLOCKS) - placed).product();
-    let interchangeable = |height: usize| heights.iter().filter(|&&other| other == height).count() as u32;
-    let orders: u32 = (2..=4).map(|height| (1..=interchangeable(height)).product::<u32>()).product();
-    placings / orders
+/// The blocks that there are.
+#[derive(Clone, Copy)]
+struct Blocks(u16);
+
+impl Blocks {
+    /// How many different end configurations there are with towers of these heights.
+    fn n_configurations(self, heights: &[usize]) -> u32 {
+        let n_used = heights.iter().sum::<usize>() as u32;
+        let placings: u32 = (0..n_used).map(|placed| u32::from(self.0).saturating_sub(placed)).product();
+        let interchangeable = |height: usize| heights.iter().filter(|&&other| other == height).count() as u32;
+        let orders: u32 = (2..=4).map(|height| (1..=interchangeable(height)).product::<u32>()).product();
+        placings / orders
+    }
 }
 
-/// How many tasks one split can have: the splits share the configurations place by place.
-pub(super) fn split_limit() -> u32 {
-    SHAPES.iter().map(|(heights, _)| n_configurations(heights)).sum::<u32>() / 2
+/// How many tasks there are, with different end configurations.
+pub(super) fn n_tasks(blocks: Option<u16>) -> u32 {
+    let blocks = Blocks(blocks.unwrap_or(N_BLOCKS));
+    SHAPES.iter().map(|(heights, _)| blocks.n_configurations(heights)).sum()
 }
 
-/// Training tasks, then unseen ones.
-pub(super) fn sample(train: usize, unseen: usize, seed: Seed) -> Vec<Task> {
-    let length = (2 * train).max(2 * unseen);
-    let stream = stream(length, seed);
-    let place = |id: usize, split| task(format!("stack_{id:04}"), Family::BlockStacking, stream[id].clone(), split);
-    let seen = (0..train).map(|at| place(2 * at, Split::Seen));
-    seen.chain((0..unseen).map(|at| place(2 * at + 1, Split::Unseen))).collect()
+/// Training tasks, then unseen ones, at most [`n_tasks`] together.
+pub(super) fn sample(blocks: Option<u16>, train: usize, unseen: usize, seed: Seed) -> Vec<Task> {
+    let all = n_tasks(blocks) as usize;
+    let length = if train.max(unseen) > all / 2 { all } else { 2 * train.max(unseen) };
+    let stream = stream(Blocks(blocks.unwrap_or(N_BLOCKS)), length, seed);
+    let place = |id: usize, split| {
+        let task = task(format!("stack_{id:04}"), Family::BlockStacking, stream[id].clone(), split);
+        Task { blocks, ..task }
+    };
+    let even = || (0..length).step_by(2);
+    let odd = || (1..length).step_by(2);
+    let seen = even().chain(odd().rev()).take(train).map(|id| place(id, Split::Seen));
+    seen.chain(odd().chain(even().rev()).take(unseen).map(|id| place(id, Split::Unseen))).collect()
 }
 
-/// The goals of the stream's first tasks. Shapes come from shuffled decks of 2000, so that the counts are exact after
-/// each deck; a shape whose configurations are used up is passed over.
-fn stream(length: usize, seed: Seed) -> Vec<Vec<Goal>> {
+/// The goals of the stream's first tasks. Shapes come from shuffled decks of 2000 (fewer with fewer blocks), so that the
+/// counts are exact after each deck; a shape whose configurations are used up is passed over.
+fn stream(blocks: Blocks, length: usize, seed: Seed) -> Vec<Vec<Goal>> {
     let mut drawn: BTreeSet<Vec<Goal>> = BTreeSet::new();
     let mut n_drawn = [0_u32; SHAPES.len()];
     let mut tasks = Vec::with_capacity(length);
     let mut deck_idx = 0;
     while tasks.len() < length {
-        for (card_idx, shape) in deck(seed, deck_idx).into_iter().enumerate() {
+        for (card_idx, shape) in deck(blocks, seed, deck_idx).into_iter().enumerate() {
             if tasks.len() == length {
                 break;
             }
             let heights = SHAPES[shape].0;
-            if n_drawn[shape] < n_configurations(heights) {
+            if n_drawn[shape] < blocks.n_configurations(heights) {
                 n_drawn[shape] += 1;
                 let mut rng = seed.derive("stacking_blocks", &[deck_idx, card_idx as u64]).rng();
-                tasks.push(new_goals(heights, &mut drawn, &mut rng));
+                tasks.push(new_goals(blocks, heights, &mut drawn, &mut rng));
             }
         }
         deck_idx += 1;
@@ -88,17 +105,23 @@ fn stream(length: usize, seed: Seed) -> Vec<Vec<Goal>> {
     tasks
 }
 
-fn deck(seed: Seed, deck_idx: u64) -> Vec<usize> {
+fn deck(blocks: Blocks, seed: Seed, deck_idx: u64) -> Vec<usize> {
     let cards = |(shape, &(_, count)): (usize, &(&[usize], u32))| std::iter::repeat_n(shape, count as usize);
-    let mut deck: Vec<usize> = SHAPES.iter().enumerate().flat_map(cards).collect();
+    let fits = |&(_, &(heights, _)): &(usize, &(&[usize], u32))| blocks.n_configurations(heights) > 0;
+    let mut deck: Vec<usize> = SHAPES.iter().enumerate().filter(fits).flat_map(cards).collect();
     deck.shuffle(&mut seed.derive("stacking_shapes", &[deck_idx]).rng());
     deck
 }
 
 /// Draws blocks and tower order until the end configuration is new.
-fn new_goals(heights: &[usize], drawn: &mut BTreeSet<Vec<Goal>>, rng: &mut impl rand::Rng) -> Vec<Goal> {
+fn new_goals(
+    blocks: Blocks,
+    heights: &[usize],
+    drawn: &mut BTreeSet<Vec<Goal>>,
+    rng: &mut impl rand::Rng,
+) -> Vec<Goal> {
     loop {
-        let goals = random_goals(heights, rng);
+        let goals = random_goals(blocks, heights, rng);
         let mut configuration = goals.clone();
         configuration.sort_unstable();
         if drawn.insert(configuration) {
@@ -108,10 +131,10 @@ fn new_goals(heights: &[usize], drawn: &mut BTreeSet<Vec<Goal>>, rng: &mut impl 
 }
 
 /// Bottom-up, one tower finished before the next, towers in any order.
-fn random_goals(heights: &[usize], rng: &mut impl rand::Rng) -> Vec<Goal> {
+fn random_goals(Blocks(n_blocks): Blocks, heights: &[usize], rng: &mut impl rand::Rng) -> Vec<Goal> {
     let mut heights = heights.to_vec();
     heights.shuffle(rng);
-    let mut blocks: Vec<SlotIndex> = (0..N_BLOCKS).map(SlotIndex).collect();
+    let mut blocks: Vec<SlotIndex> = (0..n_blocks).map(SlotIndex).collect();
     blocks.shuffle(rng);
     let mut rest = blocks.as_slice();
     let mut goals = Vec::new();

@@ -104,3 +104,27 @@ fn each_camera_has_its_topics() {
     assert_eq!(of("/camera/wrist/calibration"), Some(("foxglove.CameraCalibration", 2)));
     assert_eq!(of("/camera/front/tf"), Some(("foxglove.FrameTransforms", 2)));
 }
+
+#[test]
+fn a_demonstration_of_which_a_camera_sees_nothing_is_refused_with_episode_and_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shard.mcap");
+    let away = CameraConfig {
+        name: "sky".to_owned(),
+        eye_m: Some([0.0, -0.8, 0.8]),
+        target_m: Some([0.0, -2.0, 1.5]),
+        ..CameraConfig::new(Viewpoint::Fixed, [32, 32])
+    };
+    let [front, _] = cameras();
+    let mut writer = ShardWriter::create(&path, "{}").unwrap().with_cameras(&[front, away]);
+    let episode = episodes().remove(1);
+    let error = writer.write(&episode).unwrap_err().to_string();
+    let said = "camera sky: none of the things in the scene is in any of its pictures";
+    assert!(error.contains("episode 1") && error.contains(said), "{error}");
+    // A policy's episode may end before a camera on its gripper has seen anything.
+    let mut parts = episode.into_parts();
+    parts.provenance.actor = ntp::trace::Actor::Policy("ntp".to_owned());
+    writer.write(&Episode::new(parts).unwrap()).unwrap();
+    drop(writer);
+    assert!(!path.exists());
+}

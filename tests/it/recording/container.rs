@@ -62,7 +62,7 @@ fn the_summary_is_complete_and_in_the_order_of_ids() {
     let bytes = Recording::of(&stacking_episodes(2)).bytes();
     let summary = Summary::read(&bytes).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
-    assert_eq!((statistics.schema_count, statistics.channel_count), (10, 10));
+    assert_eq!((statistics.schema_count, statistics.channel_count), (11, 11));
     assert_eq!((statistics.attachment_count, statistics.metadata_count), (1, 1));
     assert_eq!(summary.chunk_indexes.len(), 1);
     let records: Vec<Record<'_>> = LinearReader::new(&bytes).unwrap().map(Result::unwrap).collect();
@@ -75,7 +75,7 @@ fn the_summary_is_complete_and_in_the_order_of_ids() {
         };
         records[end..].iter().filter_map(id).collect()
     };
-    assert_eq!(ids(true), (1..=10).collect::<Vec<_>>());
-    assert_eq!(ids(false), (1..=10).collect::<Vec<_>>());
+    assert_eq!(ids(true), (1..=11).collect::<Vec<_>>());
+    assert_eq!(ids(false), (1..=11).collect::<Vec<_>>());
     assert!(matches!(records[end + 1], Record::Schema { .. }), "schemas come first");
 }

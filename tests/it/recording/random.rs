@@ -5,7 +5,7 @@ use ntp::program::Program;
 use ntp::scene::{Body, BodyIndex, Bowl, Mobility, Scene, SceneState, Shape, Slot, SlotIndex};
 use ntp::task::{Family, Split};
 use ntp::trace::{
-    Actor, CallId, Cause, Episode, EpisodeParts, Frame, Outcome, Prediction, ProgramCall, Provenance, Span,
+    Actor, CallId, Cause, Episode, EpisodeParts, Frame, Outcome, Prediction, ProgramCall, Provenance, Push, Span,
 };
 use proptest::collection::vec;
 use proptest::prelude::{Strategy, any};
@@ -43,7 +43,25 @@ pub(super) fn episode(family: Family, seed: u64, n_bodies: usize, n_frames: u32)
         counts: (0..rng.random_range(0..5)).map(|_| rng.random()).collect(),
         actor,
     };
-    Episode::new(EpisodeParts { provenance, scene, frames, specification_frames, calls, outcome }).unwrap()
+    let pushes = pushes(&mut rng, &scene, &frames);
+    Episode::new(EpisodeParts { provenance, scene, frames, specification_frames, calls, pushes, outcome }).unwrap()
+}
+
+/// About half of the boundaries show what came of a push after the boundary before.
+fn pushes(rng: &mut ChaCha8Rng, scene: &Scene, frames: &[Frame]) -> Vec<Push> {
+    let mut pushes = Vec::new();
+    let mut before = 0;
+    for (end, _) in frames.iter().enumerate().skip(1).filter(|(_, frame)| frame.boundary) {
+        if rng.random() {
+            let begin = rng.random_range(before..end) as u32;
+            let body = BodyIndex(rng.random_range(0..scene.bodies.len()) as u16);
+            let toppled = scene.body_indices().filter(|_| rng.random()).collect();
+            let impulse_ns = rng.random();
+            pushes.push(Push { frames: Span { begin, end: end as u32 + 1 }, body, impulse_ns, toppled });
+        }
+        before = end;
+    }
+    pushes
 }
 
 fn scene(rng: &mut ChaCha8Rng, n_bodies: usize) -> Scene {

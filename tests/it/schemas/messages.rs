@@ -99,7 +99,7 @@ fn every_schema_is_protobuf_and_declared_in_schemas() {
     let declared: BTreeSet<String> =
         proto_files().iter().flat_map(|path| declared(&fs::read_to_string(path).unwrap())).collect();
     let schemas = schemas_of_a_recording();
-    assert_eq!(schemas.len(), 13);
+    assert_eq!(schemas.len(), 14);
     for (name, (encoding, _)) in &schemas {
         assert_eq!(encoding, "protobuf");
         assert!(declared.contains(name), "{name} is in no file of schemas/mcap");
@@ -148,7 +148,7 @@ fn field_numbers_are_those_of_the_first_version() {
         })
         .collect();
     let expected = [
-        "EpisodeEnd: index=1 success=2 cause=3 frames=4 boundary_frames=5 calls=6",
+        "EpisodeEnd: index=1 success=2 cause=3 frames=4 boundary_frames=5 calls=6 pushes=7",
         "EpisodeStart: index=1 family=2 task_id=3 task_text=4 split=5 trial=6 seed=7 counts=8 policy=9 scene=10 \
          specification_frames=11",
         "Observation: frame=1 boundary=2 opening_m=3 held=4 slots=5 slot_positions_m=6",
@@ -156,6 +156,7 @@ fn field_numbers_are_those_of_the_first_version() {
          prediction=11",
         "ProgramReturn: call=1 program=2 frame=3",
         "ProgramStack: running=1 depth_0=2 depth_1=3 depth_2=4 depth_3=5",
+        "Push: frames=1 body=2 impulse_x_ns=3 impulse_y_ns=4 impulse_z_ns=5 toppled=6",
     ];
     assert_eq!(fields, expected);
 }

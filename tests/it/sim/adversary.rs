@@ -61,7 +61,10 @@ fn what_was_pushed_lies_and_the_robot_goes_on_without_blame() {
     let state = world.state();
     assert_eq!(pushes(&world)[0].toppled, [ntp::scene::BodyIndex(0)]);
     assert!(state.bodies_in_world[0].translation.vector.z < 0.03, "it lies on the table");
-    assert_eq!(pushes(&world)[0].frame as usize, world.frames().len() - 1);
+    let frames = pushes(&world)[0].frames;
+    assert_eq!(frames.last() as usize, world.frames().len() - 1);
+    let before = &world.frames()[frames.begin as usize].state;
+    assert!(before.bodies_in_world[0].translation.vector.z > 0.07, "the frame before shows the tower");
     assert_eq!(world.frames().last().map(|frame| &frame.state), Some(&state), "the frame shows what came of it");
     assert_eq!(world.act(ntp::robot::Action::MoveTo(ntp::scene::SlotIndex(1))), Ok(()));
 }

@@ -24,7 +24,14 @@ fn random_stacking_task(seed: Seed) -> Task {
         rest = others;
     }
     let conditions = goals.iter().map(|goal| Condition::OnTop { upper: goal.source, lower: goal.target }).collect();
-    Task { id: format!("stack_{}", seed.0), family: Family::BlockStacking, goals, conditions, split: Split::Seen }
+    Task {
+        id: format!("stack_{}", seed.0),
+        family: Family::BlockStacking,
+        goals,
+        conditions,
+        split: Split::Seen,
+        blocks: None,
+    }
 }
 
 fn demonstration(task: &Task, counts: Vec<u16>, seed: Seed) -> Episode {

@@ -1,0 +1,225 @@
+//! The training of a detector, before and apart from the network behind it.
+//!
+//! # Source
+//!
+//! Paper, section V-D: the detector is trained separately, by regression on positions.
+
+use std::path::Path;
+
+use burn::tensor::Tensor;
+use rand::Rng as _;
+use rand::seq::SliceRandom as _;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::DatasetTrials;
+use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss};
+use crate::seed::Seed;
+use crate::table::{self, Column, TableError, TableSchema};
+use crate::trace::Observation;
+use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
+use crate::training::config::TrainConfig;
+use crate::training::learner::Learner;
+use crate::training::seen::{fetch, sample};
+use crate::training::{Gallery, Hooks, Progress, TrainError, dataset_hash};
+
+/// Groups of a step. A fixed number, since the sum of gradients must not depend on the machine.
+const GROUPS: usize = 2;
+/// Pictures of a trial in a group, at most.
+const OF_TRIAL: usize = 8;
+
+/// One row of `detector_metrics.parquet`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetectorMetric {
+    /// The step, from 1.
+    pub step: u32,
+    /// Of positions and gripper.
+    pub loss: f32,
+    /// Mean distance between detected and true positions, in metres.
+    pub distance_m: f32,
+    /// Of the step.
+    pub learning_rate: f64,
+    /// How many pictures were learned from.
+    pub pictures: u32,
+}
+
+/// What the training of a detector is beyond its weights.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DetectorStanding {
+    step: u32,
+    pub(super) metrics: Vec<DetectorMetric>,
+}
+
+impl Stands for DetectorStanding {
+    fn step(&self) -> u32 {
+        self.step
+    }
+}
+
+/// The training of a detector with everything settled but the detector itself.
+pub(super) struct DetectorRun<'r> {
+    pub(super) config: &'r TrainConfig,
+    pub(super) data: &'r DatasetTrials,
+    pub(super) gallery: &'r dyn Gallery,
+    pub(super) model: &'r ModelConfig,
+    pub(super) folder: &'r Path,
+    pub(super) seed: Seed,
+}
+
+/// Pictures, and what is to be seen in them.
+struct Shown {
+    pictures: Pictures,
+    /// `[F, 3 N + 2]`
+    rows: Vec<f32>,
+}
+
+impl DetectorRun<'_> {
+    /// Trains a detector, or goes on where a checkpoint stands; its learning curve beside it.
+    pub(super) fn train<D: Detector>(
+        &self,
+        detector: D,
+        hooks: &mut Hooks<'_>,
+    ) -> Result<(D, DetectorStanding), TrainError> {
+        if let Some(empty) = self.data.trials.iter().find(|trial| trial.n_frames == 0) {
+            let (task, problem) = (empty.task_id.clone(), "has no frames".to_owned());
+            return Err(TrainError::Trial { task, trial: empty.trial, problem });
+        }
+        let checkpoints = Checkpoints::of_detector(self.folder, self.model, dataset_hash(self.data));
+        let device = detector.device();
+        let fresh = Learner::new(detector, device, self.config.clip_norm);
+        let (mut learner, mut standing) = match checkpoints.resume(fresh)? {
+            Ok(Resumed { learner, standing }) => (learner, standing),
+            Err(learner) => (self.acquainted(learner)?, DetectorStanding::default()),
+        };
+        let n_steps = self.config.detector.n_steps();
+        let mut is_saved = standing.step == n_steps;
+        while standing.step < n_steps {
+            if (hooks.should_stop)() {
+                checkpoints.save(&learner, &standing)?;
+                return Err(TrainError::Stopped { step: standing.step });
+            }
+            let loss;
+            (learner, loss) = self.step(learner, &mut standing)?;
+            (hooks.on_progress)(Progress { step: standing.step, steps: self.config.n_steps_in_all(), loss });
+            is_saved = standing.step.is_multiple_of(self.config.checkpoint_every);
+            if is_saved {
+                checkpoints.save(&learner, &standing)?;
+            }
+        }
+        if !is_saved {
+            checkpoints.save(&learner, &standing)?;
+        }
+        Ok((learner.into_module(), standing))
+    }
+
+    /// Before the first step.
+    fn acquainted<D: Detector>(&self, learner: Learner<D>) -> Result<Learner<D>, TrainError> {
+        let (sample, trials): (PictureSample, _) = sample(self.data, self.gallery)?;
+        let rows: Vec<f32> = trials.iter().flat_map(|&trial| &self.data.trials[trial].observations).copied().collect();
+        let seed = self.seed.derive("acquainted", &[]);
+        let detector = learner.module().clone().acquainted(&sample, &rows, seed);
+        Ok(learner.with_module(detector))
+    }
+
+    /// One step; the learner after it and the loss.
+    fn step<D: Detector>(
+        &self,
+        learner: Learner<D>,
+        standing: &mut DetectorStanding,
+    ) -> Result<(Learner<D>, f32), TrainError> {
+        let groups: Vec<Shown> = self
+            .draw(standing.step)
+            .into_par_iter()
+            .map(|drawn| self.show(&drawn))
+            .collect::<Result<_, TrainError>>()?;
+        if standing.step + 1 < self.config.detector.n_steps() {
+            let next = self.draw(standing.step + 1).into_iter().flatten().map(|(trial, _)| trial);
+            self.gallery.announce(&next.collect::<Vec<_>>());
+        }
+        let learning_rate = self.config.detector_learning_rate_at(standing.step);
+        let (n_slots, weight) = (self.data.n_slots, 1.0 / GROUPS as f32);
+        let (learner, losses) = learner.step(&groups, learning_rate, |detector: &D, shown: &Shown| {
+            let loss = detection_loss(detector.detect(&shown.pictures), n_slots, &shown.rows);
+            let total: Tensor<1> = loss.total * weight;
+            ([total.clone().into_scalar::<f32>(), loss.distance_m * weight], Some(total))
+        });
+        let [loss, distance_m] = [0, 1].map(|at| losses.iter().map(|losses| losses[at]).sum::<f32>());
+        standing.step += 1;
+        let pictures = groups.iter().map(|shown| shown.pictures.n as u32).sum();
+        if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.detector.n_steps() {
+            standing.metrics.push(DetectorMetric { step: standing.step, loss, distance_m, learning_rate, pictures });
+        }
+        Ok((learner, loss))
+    }
+
+    /// What a step looks at, group by group: some trials, and a few frames of each.
+    fn draw(&self, step: u32) -> Vec<Vec<(usize, Vec<usize>)>> {
+        let seed = self.seed.derive("detector_step", &[u64::from(step)]);
+        let of_group = |group: usize| {
+            let mut rng = seed.derive("group", &[group as u64]).rng();
+            let mut n_left = self.config.detector.n_pictures().div_ceil(GROUPS);
+            let mut drawn = Vec::new();
+            while n_left > 0 {
+                let trial = rng.random_range(0..self.data.trials.len());
+                let mut frames: Vec<usize> = (0..self.data.trials[trial].n_frames).collect();
+                frames.shuffle(&mut rng);
+                frames.truncate(OF_TRIAL.min(n_left));
+                frames.sort_unstable();
+                n_left -= frames.len();
+                drawn.push((trial, frames));
+            }
+            drawn
+        };
+        (0..GROUPS).map(of_group).collect()
+    }
+
+    /// A group's pictures with what is to be seen in them.
+    fn show(&self, drawn: &[(usize, Vec<usize>)]) -> Result<Shown, TrainError> {
+        let width = Observation::width(self.data.n_slots);
+        let (across, down) = self.gallery.size();
+        let mut shown = Shown { pictures: Pictures::of_size(across, down), rows: Vec::new() };
+        for (trial, frames) in drawn {
+            fetch(self.data, self.gallery, *trial, frames, &mut shown.pictures)?;
+            let observations = &self.data.trials[*trial].observations;
+            shown.rows.extend(frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
+        }
+        Ok(shown)
+    }
+}
+
+/// The same trials as a detector sees them: observations are what it finds in their pictures.
+pub(super) fn detected<D: Detector>(
+    detector: &D,
+    data: &DatasetTrials,
+    gallery: &dyn Gallery,
+) -> Result<DatasetTrials, TrainError> {
+    let detector = detector.clone().valid();
+    let (width, height) = gallery.size();
+    let observations = (0..data.trials.len()).into_par_iter().map(|trial| {
+        let mut pictures = Pictures::of_size(width, height);
+        let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
+        fetch(data, gallery, trial, &frames, &mut pictures)?;
+        Ok(detected_rows(&detector, &pictures))
+    });
+    let observations: Vec<Vec<f32>> = observations.collect::<Result<_, TrainError>>()?;
+    let mut detected = data.clone();
+    detected.trials.iter_mut().zip(observations).for_each(|(trial, rows)| trial.observations = rows);
+    Ok(detected)
+}
+
+/// Writes a detector's learning curve.
+pub(super) fn write_metrics(path: &Path, metrics: &[DetectorMetric]) -> Result<(), TableError> {
+    let floats = |value: fn(&DetectorMetric) -> f32| {
+        Column::OptionalFloat32(metrics.iter().map(|metric| Some(value(metric))).collect())
+    };
+    let columns = vec![
+        ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
+        ("loss", floats(|metric| metric.loss)),
+        ("distance_m", floats(|metric| metric.distance_m)),
+        ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
+        ("pictures", Column::Int64(metrics.iter().map(|metric| i64::from(metric.pictures)).collect())),
+    ];
+    table::write(path, &TableSchema::DETECTOR_METRICS, columns)
+}

@@ -1,0 +1,210 @@
+//! Detectors: what they are told, how they are trained apart from what is behind them, and how their errors are measured.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use burn::module::Module as _;
+use burn::tensor::Device;
+use ntp::dataset::DatasetTrials;
+use ntp::geometry::{Vec3, upright};
+use ntp::model::{Decoder, Variant, VggDetector, VggDetectorConfig, WEIGHTS_FILE, detector_of};
+use ntp::render::{Camera, Visibility};
+use ntp::rollout::{Acted, Detected, DetectionRows, load_policy};
+use ntp::scene::{BodyIndex, Scene, SceneState};
+use ntp::seed::Seed;
+use ntp::table::{TableSchema, read};
+use ntp::task::{Family, Split, initial_state, scene};
+use ntp::trace::{Episode, SpecificationForm};
+use ntp::training::{
+    DETECTOR_METRICS_FILE, DetectorTraining, Gallery as _, Hooks, Progress, TrainConfig, TrainError, TrainSummary,
+    Training, train_seeing,
+};
+
+use crate::kinematic::{demonstration, tower, trial};
+use crate::painter::{Painter, Paintings};
+use crate::training::trial_data;
+
+fn shown(n_trials: u32) -> (DatasetTrials, Paintings) {
+    let tasks = [tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3, 7], Split::Seen)];
+    let of_task = |task| (0..n_trials).map(|idx| demonstration(task, &trial(task, idx, 1), 0)).collect::<Vec<_>>();
+    let episodes: Vec<Episode> = tasks.iter().flat_map(of_task).collect();
+    (DatasetTrials { n_slots: 8, trials: episodes.iter().map(trial_data).collect() }, Paintings(episodes))
+}
+
+fn training(variant: Variant, steps: u32, detector: DetectorTraining) -> Training {
+    let config =
+        TrainConfig { steps: Some(steps), batch: 8, warmup_steps: 5, metrics_every: 1, detector, ..Default::default() };
+    Training { variant, specification: SpecificationForm::Video, seed: 0, config }
+}
+
+/// Trains, and stops after some steps of detector and network together.
+fn learn(
+    training: &Training,
+    (data, paintings): &(DatasetTrials, Paintings),
+    folder: &Path,
+    stop_after: Option<u32>,
+) -> Result<TrainSummary, TrainError> {
+    let done = AtomicU32::new(0);
+    let mut on_progress = |progress: Progress| done.store(progress.step, Ordering::Relaxed);
+    let should_stop = || stop_after.is_some_and(|after| done.load(Ordering::Relaxed) >= after);
+    train_seeing(
+        training,
+        data,
+        Some(paintings),
+        folder,
+        &mut Hooks { on_progress: &mut on_progress, should_stop: &should_stop },
+    )
+}
+
+/// Mean distances in metres, step by step.
+fn curve(folder: &Path) -> Vec<f32> {
+    let mut table = read(&folder.join(DETECTOR_METRICS_FILE), &TableSchema::DETECTOR_METRICS).unwrap();
+    table.optional_float32("distance_m").unwrap().into_iter().map(Option::unwrap).collect()
+}
+
+#[test]
+fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
+    let folder = tempfile::tempdir().unwrap();
+    let detector = DetectorTraining { steps: Some(250), pictures: Some(48), ..Default::default() };
+    let shown = shown(6);
+    let training = training(Variant::NtpVidDetector, 2, detector);
+    assert_eq!(learn(&training, &shown, folder.path(), None).unwrap().steps, 2);
+    let curve = curve(folder.path());
+    assert_eq!(curve.len(), 250);
+    let end = curve[240..].iter().sum::<f32>() / 10.0;
+    assert!(end < 0.25 * curve[0], "from {} to {end} m", curve[0]);
+    // The trained policy detects what it was trained to.
+    let (_, policy) = load_policy(folder.path(), Decoder::Mss).unwrap();
+    let mut pictures = Painter::nothing();
+    shown.1.fetch(0, &[0, 1, 2], &mut pictures).unwrap();
+    let found = policy.detect(&pictures).unwrap();
+    let truth = &shown.0.trials[0].observations[..found.len()];
+    let mean = found.iter().zip(truth).map(|(found, truth)| (found - truth).abs()).sum::<f32>() / found.len() as f32;
+    assert!(mean < 0.05, "{mean} m");
+}
+
+#[test]
+fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
+    // Configuration D at full width from 224 pixels has 138 million weights with a last layer of 1000.
+    let config = VggDetectorConfig { pixels: 64, narrowed: 16 };
+    let network: VggDetector = detector_of(&config, 8, Seed(1), &Device::flex());
+    let channels = [3, 4, 4, 8, 8, 16, 16, 16, 32, 32, 32, 32, 32, 32];
+    let convolutions: usize = channels.windows(2).map(|pair| 9 * pair[0] * pair[1] + pair[1]).sum();
+    let top = (2 * 2 * 32 * 256 + 256) + (256 * 256 + 256) + (256 * 25 + 25);
+    assert_eq!(network.num_params(), convolutions + top);
+    let folder = tempfile::tempdir().unwrap();
+    let detector =
+        DetectorTraining { steps: Some(200), pictures: Some(16), learning_rate: Some(0.002), narrowed: Some(16) };
+    learn(&training(Variant::NtpVidDetectorPaper, 1, detector), &shown(2), folder.path(), None).unwrap();
+    let curve = curve(folder.path());
+    let [begin, end] = [&curve[..5], &curve[195..]].map(|part| part.iter().sum::<f32>() / 5.0);
+    assert!(end < 0.75 * begin, "from {begin} to {end} m");
+}
+
+#[test]
+fn a_training_that_was_stopped_in_either_part_comes_to_the_same_weights() {
+    let shown = shown(3);
+    let detector = DetectorTraining { steps: Some(4), pictures: Some(12), ..Default::default() };
+    let training = training(Variant::NtpVidDetector, 4, detector);
+    let whole = tempfile::tempdir().unwrap();
+    learn(&training, &shown, whole.path(), None).unwrap();
+    for stop_after in [2, 6] {
+        let stopped = tempfile::tempdir().unwrap();
+        let error = learn(&training, &shown, stopped.path(), Some(stop_after)).unwrap_err();
+        assert!(matches!(error, TrainError::Stopped { step } if step == stop_after), "{error}");
+        assert!(!stopped.path().join(WEIGHTS_FILE).exists());
+        learn(&training, &shown, stopped.path(), None).unwrap();
+        for file in [WEIGHTS_FILE, DETECTOR_METRICS_FILE] {
+            let [a, b] = [&whole, &stopped].map(|folder| std::fs::read(folder.path().join(file)).unwrap());
+            assert!(a == b, "{file} differs when stopped after {stop_after}");
+        }
+        assert!(!stopped.path().join("checkpoint").exists());
+    }
+}
+
+#[test]
+fn a_detector_learns_the_same_for_any_number_of_threads() {
+    let shown = shown(3);
+    let weights = |threads| {
+        let folder = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let detector = DetectorTraining { steps: Some(3), pictures: Some(12), ..Default::default() };
+        pool.install(|| learn(&training(Variant::NtpVidDetector, 1, detector), &shown, folder.path(), None)).unwrap();
+        std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
+    };
+    assert!(weights(1) == weights(2));
+}
+
+#[test]
+fn wrong_settings_of_a_detector_are_named_with_what_is_allowed() {
+    let check = |variant, detector, expected: &str| {
+        assert_eq!(training(variant, 1, detector).check().unwrap_err().to_string(), expected);
+    };
+    let some = DetectorTraining { steps: Some(1), ..Default::default() };
+    check(Variant::NtpVidE2e, some, "detector is set for variant ntp_vid_e2e; allowed: variants with a detector");
+    let colours = |variant, colours| {
+        let config = TrainConfig { colours: Some(colours), ..TrainConfig::default() };
+        Training { config, ..training(variant, 1, DetectorTraining::default()) }.check().unwrap_err().to_string()
+    };
+    assert_eq!(colours(Variant::NtpVidE2e, 1), "colours is 1; allowed: 2 to 64");
+    let paper = colours(Variant::NtpVidE2ePaper, 9);
+    assert_eq!(paper, "colours is 9 for variant ntp_vid_e2e_paper; allowed: variants on colour slots");
+    let none = DetectorTraining { pictures: Some(0), ..Default::default() };
+    check(Variant::NtpVidDetector, none, "detector.pictures is 0; allowed: at least 1");
+    let narrow = DetectorTraining { narrowed: Some(65), ..Default::default() };
+    check(Variant::NtpVidDetectorPaper, narrow, "detector.narrowed is 65; allowed: 1 (full width) to 64");
+    let rate = DetectorTraining { learning_rate: Some(0.0), ..Default::default() };
+    check(Variant::NtpVidDetector, rate, "detector.learning_rate is 0; allowed: greater than 0");
+}
+
+/// Two blocks before the front camera, and the others far behind it.
+fn two_blocks(places: [[f32; 3]; 2]) -> (Scene, SceneState) {
+    let scene = scene(Family::BlockStacking, &[]);
+    let mut state = initial_state(Family::BlockStacking, &scene, Seed(1));
+    state.gripper_in_world = upright(Vec3::new(0.0, -9.0, 0.3), 0.0);
+    state.bodies_in_world.iter_mut().for_each(|pose| *pose = upright(Vec3::new(0.0, -9.0, 0.025), 0.0));
+    for (body, place) in places.into_iter().enumerate() {
+        state.bodies_in_world[body] = upright(place.into(), 0.0);
+    }
+    (scene, state)
+}
+
+#[test]
+fn what_hides_a_block_takes_from_its_visible_share() {
+    let camera = Camera::front(Family::BlockStacking, [64, 64]);
+    let shares = |places| {
+        let (scene, state) = two_blocks(places);
+        Visibility::default().shares(&scene, &state, &camera)
+    };
+    let apart = shares([[-0.1, 0.0, 0.025], [0.1, 0.0, 0.025]]);
+    assert_eq!(apart[..2], [1.0, 1.0]);
+    assert_eq!(apart[2..], [0.0; 6]);
+    // The upper block hides the lower one's upper side, which is about half of its outline.
+    let stacked = shares([[0.0, 0.0, 0.025], [0.0, 0.0, 0.075]]);
+    assert!((0.35..0.65).contains(&stacked[0]), "{}", stacked[0]);
+    assert_eq!(stacked[1], 1.0);
+}
+
+#[test]
+fn errors_of_detections_are_told_of_what_moves_with_the_frames_that_they_are_of() {
+    let episode =
+        demonstration(&tower("a", &[0, 1], Split::Unseen), &trial(&tower("a", &[0, 1], Split::Unseen), 0, 1), 0);
+    let mut rows: Vec<f32> = episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
+    let n_frames = episode.boundary_frames().count();
+    rows[3 * 2 + 1] += 0.25;
+    let shares = vec![vec![0.5; 8]; n_frames];
+    let mut table = DetectionRows::default();
+    let detected = Detected { episode: 3, demonstration: &episode, rows: &rows, visible_shares: &shares };
+    table.push("ntp_vid_detector", "stacking_unseen", &Acted { train_tasks: Some(7), ..Acted::default() }, &detected);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("detections.parquet");
+    table.write(&path).unwrap();
+    assert_eq!(DetectionRows::read(&path).unwrap(), table);
+    let mut columns = read(&path, &TableSchema::DETECTIONS).unwrap();
+    let errors = columns.float64("error_y_m").unwrap();
+    assert_eq!(errors.len(), 8 * n_frames);
+    let wrong: Vec<usize> = (0..errors.len()).filter(|&row| errors[row].abs() > 1e-6).collect();
+    assert_eq!(wrong, [2]);
+    assert!((errors[2] - 0.25).abs() < 1e-6);
+    assert_eq!(columns.text("slot").unwrap()[2], episode.scene.body(BodyIndex(2)).name);
+}
