@@ -52,10 +52,10 @@ pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recur
 pub use decisions::{Decisions, MAX_ARGUMENTS};
 pub use decoder::{Decoder, LabelScores, span_score};
 pub use detecting::{Detecting, Detections, detected_rows};
-pub(crate) use detector::loss as detection_loss;
 pub use detector::{
     DetectionLoss, Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig, detector_of,
 };
+pub(crate) use detector::{loss as detection_loss, positions_in_world};
 pub use encoder::{ArgumentDecoder, Encoder, Widths};
 pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened, FlattenedConfig};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};

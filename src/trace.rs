@@ -22,7 +22,7 @@ mod specification;
 pub use boundaries::{Boundaries, RecordedFrames};
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
-pub use frame::{Frame, Observation};
+pub use frame::{Frame, GripperState, Observation};
 pub use instruction::{
     Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
 };

@@ -328,6 +328,8 @@ fn dataset_hash(data: &DatasetTrials) -> String {
         hasher.update(trial.split.name());
         hasher.update([trial.trial.to_le_bytes(), (trial.n_frames as u32).to_le_bytes()].concat());
         trial.observations.iter().for_each(|value| hasher.update(value.to_le_bytes()));
+        let grippers = trial.grippers.iter().flat_map(|gripper| gripper.in_world_m);
+        grippers.for_each(|value| hasher.update(value.to_le_bytes()));
         trial.instructions.iter().flat_map(|said| said.words).for_each(|word| hasher.update(word.to_le_bytes()));
     }
     artifact::hex(&hasher.finalize())

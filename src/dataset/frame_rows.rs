@@ -6,6 +6,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::table::{Columns, FloatRows, TableError};
+use crate::trace::GripperState;
 
 /// The columns of `data/` that a learner of programs needs.
 pub(crate) struct FrameBatch {
@@ -14,11 +15,12 @@ pub(crate) struct FrameBatch {
     pub(crate) episode_index: ScalarBuffer<i64>,
     pub(crate) index: ScalarBuffer<i64>,
     pub(crate) boundary: BooleanBuffer,
+    pub(crate) gripper: FloatRows,
 }
 
 impl Batch for FrameBatch {
     const COLUMNS: &'static [&'static str] =
-        &["observation.state", "frame_index", "episode_index", "index", "ntp.boundary"];
+        &["observation.state", "frame_index", "episode_index", "index", "ntp.boundary", "ntp.gripper_in_world_m"];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
@@ -27,6 +29,7 @@ impl Batch for FrameBatch {
             episode_index: columns.numbers("episode_index")?,
             index: columns.numbers("index")?,
             boundary: columns.flags("ntp.boundary")?,
+            gripper: columns.float_rows("ntp.gripper_in_world_m")?,
         })
     }
 }
@@ -45,12 +48,25 @@ impl FrameBatch {
         let finite = self.state.row(at).iter().all(|value| value.is_finite());
         wrong.or_else(|| (!finite).then(|| "observation.state is not finite".to_owned()))
     }
+
+    /// The gripper in a row, or what is wrong with it.
+    fn gripper(&self, at: usize) -> Result<GripperState, String> {
+        let found = self.gripper.row(at);
+        let closed = self.state.row(at).last().is_some_and(|&closed| closed > 0.5);
+        match *found {
+            [x, y, z] if found.iter().all(|value| value.is_finite()) => {
+                Ok(GripperState { in_world_m: [x, y, z], closed })
+            }
+            _ => Err(format!("ntp.gripper_in_world_m is {found:?}, but should be three finite numbers")),
+        }
+    }
 }
 
-/// The boundary observations of an episode, one after another, and which rows are boundaries.
+/// The boundary observations of an episode, one after another, the gripper in each, and which rows are boundaries.
 #[derive(Debug, Default)]
 pub(crate) struct EpisodeFrames {
     pub(crate) observations: Vec<f32>,
+    pub(crate) grippers: Vec<GripperState>,
     pub(crate) is_boundary: Vec<bool>,
 }
 
@@ -70,6 +86,8 @@ pub(crate) fn read_frames(
         frames.is_boundary.push(is_boundary);
         if is_boundary {
             frames.observations.extend_from_slice(batch.state.row(at));
+            let gripper = batch.gripper(at);
+            frames.grippers.push(gripper.map_err(|problem| cursor.problem(problem))?);
         }
     }
     Ok(frames)

@@ -125,6 +125,7 @@ fn trial(row: &EpisodeRow, frames: EpisodeFrames, calls: &[ProgramCall], width: 
         n_frames: frames.observations.len() / width,
         rows: map.recorded().to_vec(),
         observations: frames.observations,
+        grippers: frames.grippers,
         calls: calls.iter().map(on_boundaries).collect::<Result<_, _>>()?,
         instructions: Vec::new(),
     })

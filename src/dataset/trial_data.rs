@@ -1,7 +1,7 @@
 //! What a learner reads from a dataset: boundary observations and call trees, nothing else.
 
 use crate::task::{Family, Split};
-use crate::trace::{Instruction, ProgramCall};
+use crate::trace::{GripperState, Instruction, ProgramCall};
 
 /// One episode as a learner sees it.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct TrialData {
     pub rows: Vec<u32>,
     /// `[n_frames, 3 * n_slots + 2]`, row by row: [`crate::trace::Observation::to_flat`] of each boundary frame.
     pub observations: Vec<f32>,
+    /// The gripper in each boundary frame.
+    pub grippers: Vec<GripperState>,
     /// The call tree; spans count boundary frames.
     pub calls: Vec<ProgramCall>,
     /// What was done, in words, in the order of the calls.

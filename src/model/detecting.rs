@@ -56,9 +56,10 @@ impl<D: Detector, N: Network<Percepts = ()>> Detecting<D, N> {
     }
 }
 
-/// Observation rows of pictures, as a detector finds them: `[F, 3 N + 2]` in metres.
+/// Observation rows of pictures: what a detector finds in them, relative to the grippers beside them: `[F, 3 N + 2]` in
+/// metres.
 pub fn detected_rows<D: Detector>(detector: &D, pictures: &Pictures) -> Vec<f32> {
-    if pictures.n > 0 { detector::rows(detector.detect(pictures)) } else { Vec::new() }
+    if pictures.n > 0 { detector::rows(detector.detect(pictures), &pictures.grippers) } else { Vec::new() }
 }
 
 impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecting<D, N> {

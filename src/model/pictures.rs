@@ -2,12 +2,14 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 
+use crate::trace::GripperState;
+
 /// Colour pictures of one size, side by side.
 ///
 /// # Shapes
 ///
-/// `rgb` is `[n, height, width, 3]`, a byte each.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// `rgb` is `[n, height, width, 3]`, a byte each; `grippers` is `[n]`.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictures {
     /// How many.
     pub n: usize,
@@ -17,10 +19,13 @@ pub struct Pictures {
     pub height: usize,
     /// Row by row from the upper left corner.
     pub rgb: Vec<u8>,
+    /// The robot's own state when each was taken, which it need not see. What a detector finds is told from there;
+    /// networks that learn from end to end do without it.
+    pub grippers: Vec<GripperState>,
 }
 
 /// Pictures of some trials, in the order in which they were taken.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PictureSample {
     /// Trial after trial.
     pub pictures: Pictures,
@@ -31,13 +36,14 @@ pub struct PictureSample {
 impl Pictures {
     /// None yet, of a size.
     pub fn of_size(width: usize, height: usize) -> Self {
-        Self { n: 0, width, height, rgb: Vec::new() }
+        Self { n: 0, width, height, ..Self::default() }
     }
 
-    /// Adds one; nothing of another size is taken.
-    pub fn push(&mut self, rgb: &[u8]) {
+    /// Adds one, taken by a robot in a state; all are of one size.
+    pub fn push(&mut self, rgb: &[u8], gripper: GripperState) {
         debug_assert_eq!(rgb.len(), self.n_bytes(), "a picture of another size");
         self.rgb.extend_from_slice(rgb);
+        self.grippers.push(gripper);
         self.n += 1;
     }
 

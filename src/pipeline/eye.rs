@@ -16,7 +16,7 @@ struct CameraEye(Film);
 impl Eye for CameraEye {
     fn look(&mut self, scene: &Scene, frame: &Frame) -> Pictures {
         let mut seen = nothing(&self.0);
-        seen.push(&self.0.draw(scene, &frame.state).rgb);
+        seen.push(&self.0.draw(scene, &frame.state).rgb, frame.gripper());
         seen
     }
 }
@@ -43,7 +43,7 @@ pub(super) fn sight(
     film.begin_episode(demonstration)?;
     let mut video = nothing(&film);
     for (_, frame) in demonstration.boundary_frames() {
-        video.push(&film.draw(&demonstration.scene, &frame.state).rgb);
+        video.push(&film.draw(&demonstration.scene, &frame.state).rgb, frame.gripper());
     }
     film.check_sight()?;
     film.begin(demonstration.provenance.family, scene, seed)?;

@@ -4,13 +4,18 @@ use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader};
 use crate::model::Pictures;
 use crate::pipeline::PipelineError;
 use crate::pipeline::runner::Context;
+use crate::trace::GripperState;
 use crate::training::Gallery;
 
 /// Decoded pictures that are kept for when they are drawn again: about 660 episodes of 33 pictures of 64 x 64 pixels.
 const MOST_BYTES: usize = 1 << 28;
 
 /// The pictures of a dataset's trials, decoded while a step is computed.
-pub(super) struct Streamed(PictureLoader);
+pub(super) struct Streamed {
+    loader: PictureLoader,
+    /// The gripper in each frame of each trial.
+    grippers: Vec<Vec<GripperState>>,
+}
 
 /// Finds the pictures of trials in the dataset.
 ///
@@ -21,26 +26,31 @@ pub(super) fn open(context: &Context<'_>, trials: &DatasetTrials) -> Result<Stre
     let camera = context.pipeline.spec.generate.cameras.first();
     let camera = camera.map(|camera| camera.name.as_str()).unwrap_or_default();
     let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
-    Ok(Streamed(PictureLoader::open(context.dir.dataset().path(), camera, rows.collect(), MOST_BYTES)?))
+    let loader = PictureLoader::open(context.dir.dataset().path(), camera, rows.collect(), MOST_BYTES)?;
+    Ok(Streamed { loader, grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect() })
 }
 
 impl Gallery for Streamed {
     fn size(&self) -> (usize, usize) {
-        let [width, height] = self.0.size_px().map(|pixels| pixels as usize);
+        let [width, height] = self.loader.size_px().map(|pixels| pixels as usize);
         (width, height)
     }
 
     fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
-        let decoded = self.0.get(trial).map_err(|error| error.to_string())?;
+        let decoded = self.loader.get(trial).map_err(|error| error.to_string())?;
         let n_bytes = into.n_bytes().max(1);
         for &frame in frames {
             let picture = decoded.chunks_exact(n_bytes).nth(frame);
-            into.push(picture.ok_or_else(|| format!("frame {frame} has no picture"))?);
+            let gripper = self.grippers.get(trial).and_then(|grippers| grippers.get(frame));
+            let (Some(picture), Some(&gripper)) = (picture, gripper) else {
+                return Err(format!("frame {frame} has no picture or no gripper"));
+            };
+            into.push(picture, gripper);
         }
         Ok(())
     }
 
     fn announce(&self, trials: &[usize]) {
-        self.0.announce(trials);
+        self.loader.announce(trials);
     }
 }

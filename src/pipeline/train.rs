@@ -19,6 +19,11 @@ fn result_files(spec: &ModelSpec) -> impl Iterator<Item = &'static str> {
     [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE].into_iter().chain(of_detector)
 }
 
+/// Version of a training's plan. Before 2 a detector was not given the gripper's state.
+fn plan_version(spec: &ModelSpec) -> u32 {
+    if spec.variant.detects() { 2 } else { 1 }
+}
+
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let version = context.dir.dataset().version()?;
     let inputs = BTreeMap::from([(Stage::Convert.name().to_owned(), version)]);
@@ -34,7 +39,7 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
         Unit {
             dir: context.dir.model(&name),
             name: format!("train {name}"),
-            plan: Plan::new(Stage::Train.name(), 1, inputs.clone(), config),
+            plan: Plan::new(Stage::Train.name(), plan_version(spec), inputs.clone(), config),
             part: Part::Model { model, seed },
         }
     };

@@ -25,6 +25,21 @@ impl Frame {
         };
         Observation { slots_m: self.slots.iter().map(relative).collect(), closed: self.state.held.is_some() }
     }
+
+    /// What the robot knows of itself without looking.
+    pub fn gripper(&self) -> GripperState {
+        let position = self.state.gripper_in_world.translation.vector;
+        GripperState { in_world_m: [position.x, position.y, position.z], closed: self.state.held.is_some() }
+    }
+}
+
+/// Where a robot's gripper is, and whether it is closed: its proprioception.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GripperState {
+    /// Its reference point in the world, in metres: [`SceneState::gripper_in_world`].
+    pub in_world_m: [f32; 3],
+    /// Whether it holds something.
+    pub closed: bool,
 }
 
 /// The paper's full state: "object position trajectories relative to the gripper frame" (section V).

@@ -78,6 +78,9 @@ fn check(trial: &TrialData, n_slots: usize) -> Result<(), TrainError> {
     if trial.n_frames == 0 || trial.observations.len() != trial.n_frames * Observation::width(n_slots) {
         return refuse("observations are not as many as frames and slots ask for");
     }
+    if trial.grippers.len() != trial.n_frames {
+        return refuse("states of the gripper are not as many as frames");
+    }
     if trial.calls.first().is_none_or(|root| root.caller.is_some() || root.output.is_none()) {
         return refuse("the first call is not a root");
     }

@@ -13,7 +13,7 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::DatasetTrials;
-use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss};
+use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world};
 use crate::seed::Seed;
 use crate::table::{self, Column, TableError, TableSchema};
 use crate::trace::Observation;
@@ -34,7 +34,7 @@ const OF_TRIAL: usize = 8;
 pub struct DetectorMetric {
     /// The step, from 1.
     pub step: u32,
-    /// Of positions and gripper.
+    /// Of positions.
     pub loss: f32,
     /// Mean distance between detected and true positions, in metres.
     pub distance_m: f32,
@@ -71,8 +71,8 @@ pub(super) struct DetectorRun<'r> {
 /// Pictures, and what is to be seen in them.
 struct Shown {
     pictures: Pictures,
-    /// `[F, 3 N + 2]`
-    rows: Vec<f32>,
+    /// Of all slots in the world, in metres: `[F, 3 N]`.
+    positions: Vec<f32>,
 }
 
 impl DetectorRun<'_> {
@@ -119,7 +119,8 @@ impl DetectorRun<'_> {
         let (sample, trials): (PictureSample, _) = sample(self.data, self.gallery)?;
         let rows: Vec<f32> = trials.iter().flat_map(|&trial| &self.data.trials[trial].observations).copied().collect();
         let seed = self.seed.derive("acquainted", &[]);
-        let detector = learner.module().clone().acquainted(&sample, &rows, seed);
+        let positions = positions_in_world(&rows, self.data.n_slots, &sample.pictures.grippers);
+        let detector = learner.module().clone().acquainted(&sample, &positions, seed);
         Ok(learner.with_module(detector))
     }
 
@@ -139,9 +140,9 @@ impl DetectorRun<'_> {
             self.gallery.announce(&next.collect::<Vec<_>>());
         }
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
-        let (n_slots, weight) = (self.data.n_slots, 1.0 / GROUPS as f32);
+        let weight = 1.0 / GROUPS as f32;
         let (learner, losses) = learner.step(&groups, learning_rate, |detector: &D, shown: &Shown| {
-            let loss = detection_loss(detector.detect(&shown.pictures), n_slots, &shown.rows);
+            let loss = detection_loss(detector.detect(&shown.pictures), &shown.positions);
             let total: Tensor<1> = loss.total * weight;
             ([total.clone().into_scalar::<f32>(), loss.distance_m * weight], Some(total))
         });
@@ -179,13 +180,14 @@ impl DetectorRun<'_> {
     fn show(&self, drawn: &[(usize, Vec<usize>)]) -> Result<Shown, TrainError> {
         let width = Observation::width(self.data.n_slots);
         let (across, down) = self.gallery.size();
-        let mut shown = Shown { pictures: Pictures::of_size(across, down), rows: Vec::new() };
+        let (mut pictures, mut rows) = (Pictures::of_size(across, down), Vec::new());
         for (trial, frames) in drawn {
-            fetch(self.data, self.gallery, *trial, frames, &mut shown.pictures)?;
+            fetch(self.data, self.gallery, *trial, frames, &mut pictures)?;
             let observations = &self.data.trials[*trial].observations;
-            shown.rows.extend(frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
+            rows.extend(frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
         }
-        Ok(shown)
+        let positions = positions_in_world(&rows, self.data.n_slots, &pictures.grippers);
+        Ok(Shown { pictures, positions })
     }
 }
 

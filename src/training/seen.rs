@@ -31,7 +31,7 @@ pub trait Gallery: Sync {
     /// Pixels across and down each picture.
     fn size(&self) -> (usize, usize);
 
-    /// Adds pictures of a trial's frames, in order.
+    /// Adds pictures of a trial's frames, in order, each with the gripper's state.
     ///
     /// # Errors
     ///

@@ -19,7 +19,7 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
-use ntp::trace::{Actor, Episode, Frame, Provenance, SpecificationForm};
+use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
 use ntp::training::{Hooks, TrainConfig, Training, train};
 
 /// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
@@ -90,7 +90,9 @@ fn train_convolutions() {
     let network = Ntp::<FlatEncoder<Convolved>>::new(&config, 8, Seed(1), &Device::flex().autodiff());
     let mut pictures = Pictures::of_size(64, 64);
     let value = |picture: usize, at: usize| ((picture * 7919 + at * 104_729) % 251) as u8;
-    (0..BATCH).for_each(|n| pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>()));
+    (0..BATCH).for_each(|n| {
+        pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>(), GripperState::default())
+    });
     let step = || drop(network.perceive(&pictures).powf_scalar(2.0).sum().backward());
     step();
     let ((), secs) = cpu_secs(|| (0..STEPS).for_each(|_| step()));

@@ -120,6 +120,7 @@ fn expected_trial(episode: &Episode) -> TrialData {
         n_frames: boundaries.len(),
         rows: (0..boundaries.len() as u32).collect(),
         observations: episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect(),
+        grippers: episode.boundary_frames().map(|(_, frame)| frame.gripper()).collect(),
         calls: episode.calls.iter().map(call).collect(),
         instructions: instructions(&episode.calls, &episode.scene.slots),
     }

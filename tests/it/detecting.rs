@@ -7,14 +7,19 @@ use burn::module::Module as _;
 use burn::tensor::Device;
 use ntp::dataset::DatasetTrials;
 use ntp::geometry::{Vec3, upright};
-use ntp::model::{Decoder, Variant, VggDetector, VggDetectorConfig, WEIGHTS_FILE, detector_of};
+use ntp::model::{
+    ColourSlotsConfig, Decoder, Detector, Given, ModelConfig, Network, NetworkUse, Pictures, PointDetector,
+    PointDetectorConfig, Variant, VggDetector, VggDetectorConfig, WEIGHTS_FILE, Windows, detected_rows, detector_of,
+    with_network,
+};
+use ntp::program::Program;
 use ntp::render::{Camera, Visibility};
 use ntp::rollout::{Acted, Detected, DetectionRows, load_policy};
 use ntp::scene::{BodyIndex, Scene, SceneState};
 use ntp::seed::Seed;
 use ntp::table::{TableSchema, read};
 use ntp::task::{Family, Split, initial_state, scene};
-use ntp::trace::{Episode, SpecificationForm};
+use ntp::trace::{Episode, GripperState, SpecificationForm};
 use ntp::training::{
     DETECTOR_METRICS_FILE, DetectorTraining, Gallery as _, Hooks, Progress, TrainConfig, TrainError, TrainSummary,
     Training, train_seeing,
@@ -83,6 +88,84 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     assert!(mean < 0.05, "{mean} m");
 }
 
+/// Pictures of a demonstration, and the same as if a gripper elsewhere had not been seen to move.
+fn with_gripper_moved(by: [f32; 3]) -> [Pictures; 2] {
+    let mut pictures = Painter::nothing();
+    shown(1).1.fetch(0, &[0, 1, 2], &mut pictures).unwrap();
+    let mut moved = pictures.clone();
+    for GripperState { in_world_m, closed } in &mut moved.grippers {
+        *in_world_m = [0, 1, 2].map(|axis| in_world_m[axis] + by[axis]);
+        *closed = !*closed;
+    }
+    [pictures, moved]
+}
+
+fn assert_detections_move_with_the_gripper<D: Detector>(detector: &D) {
+    let by = [0.25, -0.5, 0.125];
+    let [still, moved] = with_gripper_moved(by).map(|pictures| detected_rows(detector, &pictures));
+    assert_eq!(still.len(), 3 * 26);
+    for (still, moved) in still.chunks(26).zip(moved.chunks(26)) {
+        for (at, (still, moved)) in still.iter().zip(moved).take(24).enumerate() {
+            assert!((still - by[at % 3] - moved).abs() < 1e-5, "{at}: from {still} to {moved}");
+        }
+        assert_eq!([moved[24], moved[25]], [still[25], still[24]]);
+    }
+}
+
+#[test]
+fn detected_positions_move_with_the_gripper_that_they_are_relative_to() {
+    let perception = ColourSlotsConfig { pixels: 64, colours: 12 };
+    let points: PointDetector = detector_of(&PointDetectorConfig::of(perception), 8, Seed(1), &Device::flex());
+    assert_detections_move_with_the_gripper(&points);
+    let config = VggDetectorConfig { pixels: 64, narrowed: 16 };
+    let vgg: VggDetector = detector_of(&config, 8, Seed(1), &Device::flex());
+    assert_detections_move_with_the_gripper(&vgg);
+}
+
+#[test]
+fn a_detector_is_told_of_the_gripper_what_a_frame_s_state_says() {
+    let (data, paintings) = shown(1);
+    let mut pictures = Painter::nothing();
+    paintings.fetch(0, &[0, 2, 5], &mut pictures).unwrap();
+    let told: Vec<GripperState> = [0, 2, 5].map(|frame| data.trials[0].grippers[frame]).into();
+    assert_eq!(pictures.grippers, told);
+    let closed = |frame: usize| data.trials[0].observations[frame * 26 + 25] > 0.5;
+    assert!(data.trials[0].grippers.iter().enumerate().all(|(frame, gripper)| gripper.closed == closed(frame)));
+    assert!(data.trials[0].grippers.iter().any(|gripper| gripper.closed));
+}
+
+/// Logits of the next program, and of the argument, after a look at some pictures.
+struct Decided<'p>(&'p Pictures);
+
+impl NetworkUse for Decided<'_> {
+    type Output = Vec<f32>;
+
+    fn run<N: Network>(self, network: N) -> Vec<f32> {
+        let percepts = network.perceive(self.0);
+        let demonstration = network.demonstration(&Windows::of_pictures(8, &[&[0.0, 1.0]]), &percepts);
+        let reading = network.read(&demonstration, &[2.0], &percepts, &[Given::default()]);
+        let (core, _) = network.core(&reading, Program::BlockStacking, &[1], None);
+        let argument = network.argument(&reading, Program::BlockStacking, &core);
+        let values =
+            [core.programs, core.end, argument].map(|logits| logits.into_data().try_into_vec::<f32>().unwrap());
+        values.concat()
+    }
+}
+
+#[test]
+fn no_network_but_one_behind_a_detector_reads_the_gripper_s_state() {
+    let [still, moved] = with_gripper_moved([0.25, -0.5, 0.125]);
+    let end_to_end = [Variant::NtpVidE2e, Variant::NtpVidE2ePaper, Variant::NtpVidE2eGeneral];
+    for variant in end_to_end.into_iter().chain([Variant::NtpVidDetector, Variant::NtpVidDetectorPaper]) {
+        let mut config =
+            ModelConfig::new(variant, SpecificationForm::Video, Family::BlockStacking, 8, serde_json::Value::Null);
+        config.network = config.network.seeing(64, 8).narrowed(32);
+        let [a, b] =
+            [&still, &moved].map(|pictures| with_network(&config, Seed(1), &Device::flex(), Decided(pictures)));
+        assert_eq!(a == b, end_to_end.contains(&variant), "{variant}");
+    }
+}
+
 #[test]
 fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     // Configuration D at full width from 224 pixels has 138 million weights with a last layer of 1000.
@@ -90,7 +173,7 @@ fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     let network: VggDetector = detector_of(&config, 8, Seed(1), &Device::flex());
     let channels = [3, 4, 4, 8, 8, 16, 16, 16, 32, 32, 32, 32, 32, 32];
     let convolutions: usize = channels.windows(2).map(|pair| 9 * pair[0] * pair[1] + pair[1]).sum();
-    let top = (2 * 2 * 32 * 256 + 256) + (256 * 256 + 256) + (256 * 25 + 25);
+    let top = (2 * 2 * 32 * 256 + 256) + (256 * 256 + 256) + (256 * 24 + 24);
     assert_eq!(network.num_params(), convolutions + top);
     let folder = tempfile::tempdir().unwrap();
     let detector =

@@ -70,7 +70,7 @@ fn fill(rgb: &mut [u8], centre: [f32; 2], half: [f32; 2], colour: [u8; 3]) {
 impl Eye for Painter {
     fn look(&mut self, scene: &Scene, frame: &Frame) -> Pictures {
         let mut picture = Self::nothing();
-        picture.push(&self.paint(scene, frame));
+        picture.push(&self.paint(scene, frame), frame.gripper());
         picture
     }
 }
@@ -84,7 +84,9 @@ impl Painter {
     /// What a policy is given of a demonstration.
     pub(crate) fn sight(demonstration: &Episode) -> Sight {
         let mut video = Self::nothing();
-        demonstration.boundary_frames().for_each(|(_, frame)| video.push(&Self.paint(&demonstration.scene, frame)));
+        demonstration
+            .boundary_frames()
+            .for_each(|(_, frame)| video.push(&Self.paint(&demonstration.scene, frame), frame.gripper()));
         Sight { video, eye: Box::new(Self) }
     }
 }
@@ -100,7 +102,9 @@ impl Gallery for Paintings {
     fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
         let episode = &self.0[trial];
         let boundaries: Vec<&Frame> = episode.boundary_frames().map(|(_, frame)| frame).collect();
-        frames.iter().for_each(|&frame| into.push(&Painter.paint(&episode.scene, boundaries[frame])));
+        for frame in frames.iter().map(|&frame| boundaries[frame]) {
+            into.push(&Painter.paint(&episode.scene, frame), frame.gripper());
+        }
         Ok(())
     }
 }

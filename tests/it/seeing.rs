@@ -12,7 +12,7 @@ use ntp::model::{
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
-use ntp::trace::{Actor, Episode, Provenance, SpecificationForm};
+use ntp::trace::{Actor, Episode, GripperState, Provenance, SpecificationForm};
 use ntp::training::{Gallery as _, Hooks, TrainConfig, Training, train, train_seeing};
 
 use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
@@ -92,7 +92,7 @@ fn noise(shift: usize) -> Pictures {
     let value = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * y * 31) % 251) as u8;
     let moved = |at: usize| (at + size - shift) % size;
     let pixels = (0..size * size).flat_map(|at| [0, 3, 5].map(|more| value(moved(at % size) + more, moved(at / size))));
-    pictures.push(&pixels.collect::<Vec<u8>>());
+    pictures.push(&pixels.collect::<Vec<u8>>(), GripperState::default());
     pictures
 }
 

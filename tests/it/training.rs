@@ -30,6 +30,7 @@ pub(crate) fn trial_data(episode: &Episode) -> TrialData {
         n_frames: episode.frames.len(),
         rows: (0..episode.frames.len() as u32).collect(),
         observations: frames.flatten().collect(),
+        grippers: episode.boundary_frames().map(|(_, frame)| frame.gripper()).collect(),
         calls: episode.calls.clone(),
         instructions: instructions(&episode.calls, &episode.scene.slots),
     }

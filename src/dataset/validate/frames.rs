@@ -27,7 +27,6 @@ pub(super) struct FullFrameBatch {
     success: BooleanBuffer,
     time_secs: Vec<f64>,
     recording_frame: ScalarBuffer<i64>,
-    gripper: FloatRows,
     call_id: ScalarBuffer<i64>,
     program: TextRows,
 }
@@ -63,7 +62,6 @@ impl Batch for FullFrameBatch {
             success: columns.flags("next.success")?,
             time_secs: columns.float64("ntp.time_secs")?,
             recording_frame: columns.numbers("ntp.recording_frame")?,
-            gripper: columns.float_rows("ntp.gripper_in_world_m")?,
             call_id: columns.numbers("ntp.call_id")?,
             program: columns.text_rows("ntp.program", Form::Required)?,
         })
@@ -82,7 +80,7 @@ impl Before {
     fn new(batch: &FullFrameBatch, at: usize) -> Self {
         Self {
             action: first(batch.action.row(at)),
-            gripper: first(batch.gripper.row(at)),
+            gripper: first(batch.base.gripper.row(at)),
             time_secs: batch.time_secs[at],
             recording_frame: batch.recording_frame[at],
         }
@@ -185,8 +183,8 @@ impl FrameCheck {
         if !matches!(one_hot, [1.0, 0.0] | [0.0, 1.0]) {
             problems.push(("frames.state", format!("(open, closed) are {one_hot:?}")));
         }
-        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.gripper.row(at).len() != 3 {
-            let lengths = (batch.action.row(at).len(), batch.gripper.row(at).len());
+        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.base.gripper.row(at).len() != 3 {
+            let lengths = (batch.action.row(at).len(), batch.base.gripper.row(at).len());
             problems.push(("frames.action", format!("action and gripper position are {lengths:?} wide, not (4, 3)")));
         } else if is_last && batch.action.row(at) != [0.0, 0.0, 0.0, one_hot[1]] {
             problems.push(("frames.action", format!("the last action is {:?}", batch.action.row(at))));
@@ -220,7 +218,7 @@ fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&
             format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
         ));
     }
-    let [x, y, z] = first(batch.gripper.row(at));
+    let [x, y, z] = first(batch.base.gripper.row(at));
     let [from_x, from_y, from_z] = before.gripper;
     let closed = batch.base.state.row(at).last().copied().unwrap_or(f32::NAN);
     let expected = [x - from_x, y - from_y, z - from_z, closed];

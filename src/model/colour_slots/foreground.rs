@@ -113,6 +113,7 @@ fn colour(rgb: [u8; 3]) -> [f32; COLOUR_WIDTH] {
 mod tests {
     use super::{background, foreground};
     use crate::model::pictures::Pictures;
+    use crate::trace::GripperState;
 
     /// Two by two pixels: grey, but for one pixel.
     fn picture(at: usize, colour: [u8; 3]) -> Vec<u8> {
@@ -123,7 +124,7 @@ mod tests {
         let mut pictures = Pictures::of_size(2, 2);
         [(0, [200, 0, 0]), (0, [0, 200, 0]), (0, [0, 0, 200]), (3, [200, 0, 0]), (1, [100; 3]), (2, [100; 3])]
             .into_iter()
-            .for_each(|(at, colour)| pictures.push(&picture(at, colour)));
+            .for_each(|(at, colour)| pictures.push(&picture(at, colour), GripperState::default()));
         pictures
     }
 

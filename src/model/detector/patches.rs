@@ -74,11 +74,12 @@ mod tests {
     use super::{Claimed, GAIN};
     use crate::model::colour_slots::Claims;
     use crate::model::pictures::Pictures;
+    use crate::trace::GripperState;
 
     #[test]
     fn a_patch_tells_whose_the_pixels_about_a_place_are() {
         let mut pictures = Pictures::of_size(4, 4);
-        pictures.push(&[0; 48]);
+        pictures.push(&[0; 48], GripperState::default());
         // The second of two things at (2, 1), the robot at (3, 1), half the first thing's at (2, 2).
         let points = vec![(2, 1, [0.0, 0.0, 1.0]), (3, 1, [1.0, 0.0, 0.0]), (2, 2, [0.0, 0.5, 0.5])];
         let claims = Claims::made(3, points, vec![0.2; 16]);

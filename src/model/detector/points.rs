@@ -3,14 +3,13 @@
 //!
 //! ```text
 //! colour slots ─► place, mass, spread ──┐
-//!     │              └─► pairs ─────────┼─► position of each thing ──┐
-//!     └─► patch about each place ───────┘                            ├─► difference
-//!         patch about the robot ──────────► position of the gripper ─┘
+//!     │              └─► pairs ─────────┼─► position of each thing in the world
+//!     └─► patch about each place ───────┘
 //! ```
 //!
 //! Colours are found, and slots told by them, before the first step; they are not learned further. A patch shows what hides a thing, on what it stands and where its edges lie, which moments of its visible part do
-//! not. All things share their weights but for a bias; things and gripper are placed by themselves, since where a thing
-//! is does not depend on where the gripper is.
+//! not. All things share their weights but for a bias. The robot is one of the colours, since it hides and holds things;
+//! where it is, it knows of itself.
 //!
 //! # Source
 //!
@@ -52,16 +51,12 @@ pub struct PointDetectorConfig {
     pub pair_width: usize,
     /// Pixels across and down a thing's patch. Default a quarter of the picture.
     pub patch: usize,
-    /// Pixels across and down the gripper's patch, which holds its shadow too: where that lies tells how high the gripper is.
-    /// Default half of the picture.
-    pub gripper_patch: usize,
 }
 
 impl PointDetectorConfig {
     /// The default widths with colour slots.
     pub fn of(perception: ColourSlotsConfig) -> Self {
-        let pixels = perception.pixels;
-        Self { perception, width: 64, pair_width: 16, patch: pixels / 4, gripper_patch: pixels / 2 }
+        Self { perception, width: 64, pair_width: 16, patch: perception.pixels / 4 }
     }
 }
 
@@ -71,7 +66,6 @@ pub struct PointDetector {
     perception: ColourSlots,
     n_slots: usize,
     patch: usize,
-    gripper_patch: usize,
     pairs: Mlp,
     surroundings: Mlp,
     thing: Linear,
@@ -83,10 +77,6 @@ pub struct PointDetector {
     place: Linear,
     /// `[N, 3]`
     slot_positions: Param<Tensor<2>>,
-    gripper_surroundings: Mlp,
-    gripper: Mlp,
-    gripper_position: Linear,
-    gripper_place: Linear,
 }
 
 /// A find as numbers of about one, with products of its place.
@@ -104,8 +94,6 @@ struct Looks {
     looks: Tensor<3>,
     /// `[F, N, patch]`
     patches: Tensor<3>,
-    /// `[F, patch]`
-    gripper_patch: Tensor<2>,
 }
 
 impl PointDetector {
@@ -116,14 +104,16 @@ impl PointDetector {
         let mut finder = Finder::new(pictures.width, pictures.height);
         let n_percepts = self.n_slots + 1;
         let mut looks = vec![0.0; pictures.n * n_percepts * LOOK_WIDTH];
-        let mut patches = Vec::with_capacity(n_percepts);
+        let (side, mut patches) = (self.patch, Vec::with_capacity(self.n_slots));
         for slot in 0..n_percepts {
-            let (side, window) =
-                if slot == 0 { (self.gripper_patch, 3 * self.gripper_patch / 8) } else { (self.patch, self.patch / 2) };
+            let window = if slot == 0 { 3 * side / 4 } else { side / 2 };
             let finds: Vec<Find> = (0..pictures.n).map(|picture| finder.find(&claims, picture, slot, window)).collect();
             for (picture, find) in finds.iter().enumerate() {
                 let at = (picture * n_percepts + slot) * LOOK_WIDTH;
                 looks[at..at + LOOK_WIDTH].copy_from_slice(&told(find, pictures));
+            }
+            if slot == 0 {
+                continue;
             }
             let centres: Vec<[f32; 2]> = finds.iter().map(|find| find.centre).collect();
             let shape = [pictures.n, 1, side * side * CHANNELS];
@@ -131,8 +121,7 @@ impl PointDetector {
             patches.push(Tensor::<3>::from_data(patch, &device));
         }
         let looks = TensorData::new(looks, [pictures.n, n_percepts, LOOK_WIDTH]);
-        let gripper_patch = patches.remove(0).flatten::<2>(1, 2);
-        Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1), gripper_patch }
+        Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1) }
     }
 
     /// The most that the other slots and the robot tell of each thing by where they lie to it: `[F, N, pair]`.
@@ -146,7 +135,7 @@ impl PointDetector {
         pairs.max_dim(2).squeeze_dim(2)
     }
 
-    /// Positions of all things in decimetres from a point that is the gripper's too: `[F, N, 3]`.
+    /// Positions of all things in the world, in decimetres: `[F, N, 3]`.
     fn things(&self, seen: &Looks) -> Tensor<3> {
         let looks = seen.looks.clone().narrow(1, 1, self.n_slots);
         let surroundings = self.surroundings.forward(seen.patches.clone());
@@ -155,27 +144,18 @@ impl PointDetector {
         let position = self.position.forward(self.hidden.forward(hidden));
         position + self.place.forward(looks) + self.slot_positions.val().unsqueeze_dim::<3>(0)
     }
-
-    /// Position of the gripper, and the logit that it is closed: `[F, 4]`.
-    fn gripper(&self, seen: &Looks) -> Tensor<2> {
-        let look: Tensor<2> = seen.looks.clone().narrow(1, 0, 1).squeeze_dim(1);
-        let surroundings = self.gripper_surroundings.forward(seen.gripper_patch.clone());
-        let hidden = self.gripper.forward(Tensor::cat(vec![surroundings, look.clone()], 1));
-        self.gripper_position.forward(hidden) + self.gripper_place.forward(look)
-    }
 }
 
 impl Detector for PointDetector {
     type Config = PointDetectorConfig;
 
     fn new(config: &PointDetectorConfig, n_slots: usize, init: &mut Init) -> Self {
-        let &PointDetectorConfig { perception, width, pair_width, patch, gripper_patch } = config;
+        let &PointDetectorConfig { perception, width, pair_width, patch } = config;
         let n_told = width + LOOK_WIDTH + pair_width;
         Self {
             perception: ColourSlots::new(&perception, init),
             n_slots,
             patch,
-            gripper_patch,
             pairs: init.mlp(&[2 * LOOK_WIDTH, pair_width, pair_width]),
             surroundings: init.mlp(&[patch * patch * CHANNELS, width, width]),
             thing: init.linear(n_told, width),
@@ -184,29 +164,21 @@ impl Detector for PointDetector {
             position: init.linear(width, 3),
             place: init.linear(LOOK_WIDTH, 3),
             slot_positions: init.filled([n_slots, 3], 0.0),
-            gripper_surroundings: init.mlp(&[gripper_patch * gripper_patch * CHANNELS, width, width]),
-            gripper: init.mlp(&[width + LOOK_WIDTH, width]),
-            gripper_position: init.linear(width, 4),
-            gripper_place: init.linear(LOOK_WIDTH, 4),
         }
     }
 
-    fn acquainted(mut self, sample: &PictureSample, rows: &[f32], seed: Seed) -> Self {
+    fn acquainted(mut self, sample: &PictureSample, positions: &[f32], seed: Seed) -> Self {
         self.perception = self.perception.acquainted(sample, seed);
         let (looks, ()) = self.perception.look(&sample.pictures);
         let [_, n_colours, width] = looks.dims();
         let looks: Vec<f32> = looks.into_data().try_into_vec().unwrap_or_default();
-        let colours = colours_of_slots(&looks, [n_colours, width], rows, self.n_slots);
+        let colours = colours_of_slots(&looks, [n_colours, width], positions, self.n_slots);
         self.perception = self.perception.with_first(&colours);
         self
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let seen = self.look(pictures);
-        let things = self.things(&seen);
-        let gripper = self.gripper(&seen);
-        let positions = things - gripper.clone().narrow(1, 0, 3).unsqueeze_dim::<3>(1);
-        Tensor::cat(vec![positions.flatten::<2>(1, 2), gripper.narrow(1, 3, 1)], 1)
+        self.things(&self.look(pictures)).flatten::<2>(1, 2)
     }
 
     fn device(&self) -> Device {

@@ -68,7 +68,7 @@ impl Detector for VggDetector {
         Self {
             blocks,
             top: init.mlp(&[channels * pixels * pixels, top, top]),
-            positions: init.linear(top, 3 * n_slots + 1),
+            positions: init.linear(top, 3 * n_slots),
         }
     }
 
