@@ -19,27 +19,25 @@ fn result_files(spec: &ModelSpec) -> impl Iterator<Item = &'static str> {
     [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE].into_iter().chain(of_detector)
 }
 
-/// Version of a training's plan. Before 2 a detector was not given the gripper's state.
-fn plan_version(spec: &ModelSpec) -> u32 {
-    if spec.variant.detects() { 2 } else { 1 }
-}
-
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let version = context.dir.dataset().version()?;
     let inputs = BTreeMap::from([(Stage::Convert.name().to_owned(), version)]);
     let models = context.pipeline.spec.models.iter().enumerate();
     let unit = |(model, spec): (usize, &ModelSpec), seed: u64| {
         let name = model_name(spec, seed);
-        let config = json!({
+        let mut config = json!({
             "variant": spec.variant,
             "seed": seed,
             "train_tasks": spec.train_tasks,
             "training": spec.training,
         });
+        if spec.variant.detects() {
+            config["detector_given"] = json!("gripper");
+        }
         Unit {
             dir: context.dir.model(&name),
             name: format!("train {name}"),
-            plan: Plan::new(Stage::Train.name(), plan_version(spec), inputs.clone(), config),
+            plan: Plan::new(Stage::Train.name(), 1, inputs.clone(), config),
             part: Part::Model { model, seed },
         }
     };

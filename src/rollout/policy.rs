@@ -51,7 +51,8 @@ pub struct Query {
     pub program: Program,
     /// Where things are now.
     pub observation: Observation,
-    /// The picture of now, for a policy that sees, which is given it in place of the observation; none for another.
+    /// The picture of now with the gripper's state, for a policy that sees, which is given it in place of the
+    /// observation; none for another.
     pub seen: Arc<Pictures>,
 }
 

@@ -88,7 +88,7 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     assert!(mean < 0.05, "{mean} m");
 }
 
-/// Pictures of a demonstration, and the same as if a gripper elsewhere had not been seen to move.
+/// Pictures of a demonstration, and the same of a robot whose gripper is said to be elsewhere and the other way open.
 fn with_gripper_moved(by: [f32; 3]) -> [Pictures; 2] {
     let mut pictures = Painter::nothing();
     shown(1).1.fetch(0, &[0, 1, 2], &mut pictures).unwrap();

@@ -69,7 +69,8 @@ const NOTES: [(&str, &str); 5] = [
     (
         "ntp_vid_detector",
         "A detector that finds things by their colour and learns from true positions, with all that colour slots need; \
-         NTP behind it learns on what it finds.",
+         NTP behind it learns on what it finds. Where the gripper is and whether it is closed, the robot knows of itself; \
+         end to end no network is given that.",
     ),
     ("ntp_vid_detector_paper", "A detector of VGG16's shape that learns from true positions, before `ntp_paper`."),
 ];
