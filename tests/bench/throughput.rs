@@ -91,7 +91,7 @@ fn train_convolutions() {
     let mut pictures = Pictures::of_size(64, 64);
     let value = |picture: usize, at: usize| ((picture * 7919 + at * 104_729) % 251) as u8;
     (0..BATCH).for_each(|n| {
-        pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>(), GripperState::default())
+        pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>(), GripperState::default());
     });
     let step = || drop(network.perceive(&pictures).powf_scalar(2.0).sum().backward());
     step();
