@@ -21,6 +21,10 @@ use crate::training::metrics::Metric;
 
 /// Under the model's folder.
 const FOLDER: &str = "checkpoint";
+/// Under that, for a detector.
+const DETECTOR_FOLDER: &str = "detector";
+/// What names the parts of the checkpoint that counts.
+const LATEST_FILE: &str = "latest.json";
 
 /// `latest.json`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -81,7 +85,7 @@ impl<'c> Checkpoints<'c> {
 
     /// Those of the detector that is trained before the network.
     pub(crate) fn of_detector(folder: &Path, model: &'c ModelConfig, dataset: String) -> Self {
-        Self { folder: folder.join(FOLDER).join("detector"), model, dataset }
+        Self { folder: folder.join(FOLDER).join(DETECTOR_FOLDER), model, dataset }
     }
 
     /// Saves, and then removes the checkpoint before.
@@ -132,8 +136,11 @@ impl<'c> Checkpoints<'c> {
         Ok(Ok(Resumed { learner, standing: latest.standing }))
     }
 
-    /// Removes what is left once the model itself is written.
+    /// Removes what is left once the model itself is written; what names the parts first, so that no checkpoint is ever
+    /// found without them.
     pub(crate) fn clear(&self) -> Result<(), IoError> {
+        remove(&self.folder.join(DETECTOR_FOLDER).join(LATEST_FILE))?;
+        remove(&self.latest_path())?;
         match std::fs::remove_dir_all(&self.folder) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 Err(IoError::system("remove", &self.folder)(error))
@@ -143,7 +150,7 @@ impl<'c> Checkpoints<'c> {
     }
 
     fn latest_path(&self) -> PathBuf {
-        self.folder.join("latest.json")
+        self.folder.join(LATEST_FILE)
     }
 
     fn latest<S: Stands>(&self) -> Result<Option<Latest<S>>, IoError> {
