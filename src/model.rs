@@ -19,6 +19,7 @@
 mod build;
 mod colour_slots;
 mod config;
+mod convolution;
 mod core_network;
 mod decisions;
 mod decoder;

@@ -20,12 +20,12 @@
 mod naming;
 
 use burn::module::Module;
-use burn::nn::conv::Conv2d;
-use burn::nn::{Linear, PaddingConfig2d};
+use burn::nn::Linear;
 use burn::tensor::activation::{relu, sigmoid, softmax};
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
+use crate::model::convolution::Convolution;
 pub use crate::model::keypoints::naming::GlimpseNaming;
 use crate::model::layers::Init;
 use crate::model::perception::{Looks, Perception};
@@ -58,9 +58,9 @@ impl KeypointsConfig {
 #[derive(Module, Debug)]
 pub struct Keypoints {
     /// Each halves the picture.
-    shrinking: Vec<Conv2d>,
+    shrinking: Vec<Convolution>,
     /// Each adds to its input.
-    widening: Vec<Conv2d>,
+    widening: Vec<Convolution>,
     scores: Linear,
 }
 
@@ -105,7 +105,7 @@ impl Keypoints {
         Self::new(config, &mut Init::new(seed, device))
     }
 
-    /// `F` pictures → features of their cells, `[F, features, rows, columns]`.
+    /// `F` pictures → features of their cells, `[F, rows, columns, features]`.
     fn cells(&self, pictures: &Pictures) -> Tensor<4> {
         let seen = self
             .shrinking
@@ -122,11 +122,10 @@ impl Perception for Keypoints {
 
     fn new(config: &KeypointsConfig, init: &mut Init) -> Self {
         let &KeypointsConfig { slots, features, .. } = config;
-        let around = |reach| PaddingConfig2d::Explicit(reach, reach, reach, reach);
         let half = features / 2;
         Self {
-            shrinking: vec![init.conv([4, half], 5, 2, around(2)), init.conv([half, features], 3, 2, around(1))],
-            widening: vec![init.conv([features, features], 3, 1, around(1))],
+            shrinking: vec![init.conv([4, half], [5, 2, 2]), init.conv([half, features], [3, 2, 1])],
+            widening: vec![init.conv([features, features], [3, 1, 1])],
             scores: init.linear(features, 1 + slots),
         }
     }
@@ -141,9 +140,9 @@ impl Perception for Keypoints {
 
     fn look(&self, pictures: &Pictures) -> (Tensor<3>, CellLooks) {
         let cells = self.cells(pictures);
-        let [n, width, rows, columns] = cells.dims();
+        let [n, rows, columns, width] = cells.dims();
         let n_cells = rows * columns;
-        let features = cells.reshape([n, width, n_cells]).swap_dims(1, 2);
+        let features = cells.reshape([n, n_cells, width]);
         let scores = self.scores.forward(features) * SCORE_GAIN; // [F, L, K]
         let n_points = scores.dims()[2];
         let places = TensorData::new(cell_places(rows, columns), [1, 2, n_cells]);

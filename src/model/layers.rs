@@ -5,13 +5,13 @@
 //! The last dimension of every tensor holds features; `[B, T, ...]` is batch and frame.
 
 use burn::module::{Module, Param, ParamId};
-use burn::nn::conv::Conv2d;
-use burn::nn::{Linear, PaddingConfig2d};
+use burn::nn::Linear;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng as _;
 use rand_chacha::ChaCha8Rng;
 
+use crate::model::convolution::Convolution;
 use crate::seed::Seed;
 
 /// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
@@ -74,26 +74,16 @@ impl Init {
         self.mlp(&[&[n_inputs], widths].concat())
     }
 
-    /// A convolution of pictures, of a square kernel.
+    /// A convolution of pictures.
     pub(crate) fn conv(
         &mut self,
         [n_inputs, n_outputs]: [usize; 2],
-        kernel: usize,
-        stride: usize,
-        padding: PaddingConfig2d,
-    ) -> Conv2d {
+        [kernel, stride, padding]: [usize; 3],
+    ) -> Convolution {
+        let n_patch = kernel * kernel * n_inputs;
         // He's bound for rectifiers: with the smaller one of `linear` seven layers fade a picture out.
-        let bound = (6.0 / (n_inputs * kernel * kernel) as f32).sqrt();
-        let weight = self.parameter([n_outputs, n_inputs, kernel, kernel], bound);
-        Conv2d {
-            weight,
-            bias: Some(self.filled([n_outputs], 0.0)),
-            stride: [stride; 2],
-            kernel_size: [kernel; 2],
-            dilation: [1; 2],
-            groups: 1,
-            padding,
-        }
+        let weight = self.parameter([n_patch, n_outputs], (6.0 / n_patch as f32).sqrt());
+        Convolution::new(weight, self.filled([n_outputs], 0.0), [kernel, stride, padding])
     }
 
     pub(crate) fn temporal_conv(&mut self, kernel: usize, n_inputs: usize, n_outputs: usize) -> TemporalConv {

@@ -52,21 +52,21 @@ impl Pictures {
         self.rgb.chunks_exact(self.n_bytes().max(1))
     }
 
-    /// Values from -1 to 1 as convolutions take them: `[n, 3, height, width]`.
+    /// Values from -1 to 1 as convolutions take them: `[n, height, width, 3]`.
     pub(crate) fn to_tensor(&self, device: &Device) -> Tensor<4> {
         let values: Vec<f32> = self.rgb.iter().map(|&value| f32::from(value) / 127.5 - 1.0).collect();
         let shape = [self.n, self.height, self.width, 3];
-        Tensor::<4>::from_data(TensorData::new(values, shape), device).permute([0, 3, 1, 2])
+        Tensor::from_data(TensorData::new(values, shape), device)
     }
 
     /// The same with a fourth channel: brightness against its surroundings, in their deviations. What is written on a
-    /// thing looks alike there in any colour and light. `[n, 4, height, width]`
+    /// thing looks alike there in any colour and light. `[n, height, width, 4]`
     pub(crate) fn to_contrast_tensor(&self, device: &Device) -> Tensor<4> {
         let contrasts: Vec<f32> =
             self.iter().flat_map(|picture| contrasts(&brightness(picture), self.width, self.height)).collect();
-        let shape = [self.n, 1, self.height, self.width];
+        let shape = [self.n, self.height, self.width, 1];
         let contrasts = Tensor::<4>::from_data(TensorData::new(contrasts, shape), device);
-        Tensor::cat(vec![self.to_tensor(device), contrasts], 1)
+        Tensor::cat(vec![self.to_tensor(device), contrasts], 3)
     }
 
     /// Bytes of one.

@@ -1,12 +1,11 @@
 //! What the flattened encoder reads: one vector for each frame and for the state, from positions or from pictures.
 
 use burn::module::{Module, ModuleDisplay};
-use burn::nn::PaddingConfig2d;
-use burn::nn::conv::Conv2d;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
+use crate::model::convolution::Convolution;
 use crate::model::features::{Rows, flat_width};
 use crate::model::flattened::FlattenedConfig;
 use crate::model::layers::Init;
@@ -103,7 +102,7 @@ const LAYERS: [(usize, usize); 6] = [(16, 2), (24, 1), (32, 2), (48, 2), (64, 2)
 /// Paper, section V-D.
 #[derive(Module, Debug)]
 pub struct Convolved {
-    layers: Vec<Conv2d>,
+    layers: Vec<Convolution>,
 }
 
 impl Vectors for Convolved {
@@ -113,10 +112,10 @@ impl Vectors for Convolved {
     fn new(config: &ConvolvedConfig, init: &mut Init) -> Self {
         let (mut layers, mut channels, mut pixels) = (Vec::new(), 3, config.pixels);
         for (n_channels, stride) in LAYERS {
-            layers.push(init.conv([channels, n_channels], 3, stride, PaddingConfig2d::Explicit(1, 1, 1, 1)));
+            layers.push(init.conv([channels, n_channels], [3, stride, 1]));
             (channels, pixels) = (n_channels, pixels.div_ceil(stride));
         }
-        layers.push(init.conv([channels, config.features], pixels.max(1), 1, PaddingConfig2d::Valid));
+        layers.push(init.conv([channels, config.features], [pixels.max(1), 1, 0]));
         Self { layers }
     }
 
@@ -130,7 +129,7 @@ impl Vectors for Convolved {
 
     /// `F` pictures → `[F, features]`.
     fn perceive(&self, pictures: &Pictures) -> Tensor<2> {
-        let pixels = pictures.to_tensor(&self.layers[0].weight.device());
+        let pixels = pictures.to_tensor(&self.layers[0].device());
         let seen = self.layers.iter().fold(pixels, |seen, layer| relu(layer.forward(seen)));
         seen.flatten(1, 3)
     }

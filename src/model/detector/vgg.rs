@@ -6,13 +6,13 @@
 //! parameter, since a CPU has no week for the full one.
 
 use burn::module::Module;
-use burn::nn::conv::Conv2d;
+use burn::nn::Linear;
 use burn::nn::pool::MaxPool2dConfig;
-use burn::nn::{Linear, PaddingConfig2d};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
+use crate::model::convolution::Convolution;
 use crate::model::detector::Detector;
 use crate::model::layers::{Init, Mlp};
 use crate::model::pictures::Pictures;
@@ -44,7 +44,7 @@ impl VggDetectorConfig {
 /// VGG16's layers.
 #[derive(Module, Debug)]
 pub struct VggDetector {
-    blocks: Vec<Vec<Conv2d>>,
+    blocks: Vec<Vec<Convolution>>,
     top: Mlp,
     positions: Linear,
 }
@@ -58,7 +58,7 @@ impl Detector for VggDetector {
         let mut blocks = Vec::new();
         for (full, n_layers) in BLOCKS {
             let width = (full / narrowed).max(1);
-            let mut layer = |inputs| init.conv([inputs, width], 3, 1, PaddingConfig2d::Explicit(1, 1, 1, 1));
+            let mut layer = |inputs| init.conv([inputs, width], [3, 1, 1]);
             let first = layer(channels);
             let rest = (1..n_layers).map(|_| layer(width));
             blocks.push(std::iter::once(first).chain(rest).collect());
@@ -77,7 +77,7 @@ impl Detector for VggDetector {
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
         let seen = self.blocks.iter().fold(pixels, |seen, block| {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
-            pool.forward(seen)
+            pool.forward(seen.permute([0, 3, 1, 2])).permute([0, 2, 3, 1])
         });
         self.positions.forward(self.top.forward(seen.flatten::<2>(1, 3)))
     }
