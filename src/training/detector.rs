@@ -20,8 +20,9 @@ use crate::trace::Observation;
 use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
 use crate::training::config::TrainConfig;
 use crate::training::learner::Learner;
+use crate::training::run::dataset_hash;
 use crate::training::seen::{fetch, sample};
-use crate::training::{Gallery, Hooks, Progress, TrainError, dataset_hash};
+use crate::training::{Gallery, Hooks, Progress, TrainError};
 
 /// Groups of a step. A fixed number, since the sum of gradients must not depend on the machine.
 const GROUPS: usize = 2;

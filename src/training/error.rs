@@ -1,0 +1,75 @@
+//! Why a training cannot go on.
+
+use std::path::PathBuf;
+
+use crate::artifact::IoError;
+use crate::model::ModelError;
+use crate::table::TableError;
+
+/// A training that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// A setting makes no sense.
+    #[error("{key} is {found}; allowed: {allowed}")]
+    Config {
+        /// Its key.
+        key: &'static str,
+        /// As found.
+        found: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The dataset has nothing to learn from.
+    #[error("none of the dataset's {total} successful episodes is of a training task")]
+    NoTrials {
+        /// Successful episodes of any split.
+        total: usize,
+    },
+    /// Trials of different families cannot be learned together.
+    #[error(
+        "the dataset holds more than one family: trial {trial} of task {task} is of {found}, the first of {expected}"
+    )]
+    MixedFamilies {
+        /// The first trial that differs.
+        trial: u32,
+        /// Its task.
+        task: String,
+        /// Its family.
+        found: &'static str,
+        /// The family of the first trial.
+        expected: &'static str,
+    },
+    /// A trial does not fit together.
+    #[error("trial {trial} of task {task}: {problem}")]
+    Trial {
+        /// The task's id.
+        task: String,
+        /// The trial's number.
+        trial: u32,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A checkpoint cannot be used; removing its folder starts afresh.
+    #[error("checkpoint cannot be used: {problem}: {}", path.display())]
+    Checkpoint {
+        /// What is wrong.
+        problem: String,
+        /// The file.
+        path: PathBuf,
+    },
+    /// The learning curves could not be stored.
+    #[error(transparent)]
+    Metrics(#[from] TableError),
+    /// The weights could not be stored.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// It was asked to stop; a checkpoint holds where it stands.
+    #[error("training was stopped after step {step}")]
+    Stopped {
+        /// Steps done.
+        step: u32,
+    },
+}
