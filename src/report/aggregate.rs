@@ -9,7 +9,19 @@ use crate::report::summary::{Aggregate, SuiteResult};
 /// Sums results over training seeds. They stand sorted, so those of one actor and suite are neighbours.
 pub(super) fn aggregates(results: &[SuiteResult], paper: &[PaperValue]) -> Vec<Aggregate> {
     let same = |a: &SuiteResult, b: &SuiteResult| (&a.actor, &a.suite) == (&b.actor, &b.suite);
-    results.chunk_by(same).map(|seeds| aggregate(seeds, paper)).collect()
+    let most_tasks = |of: &SuiteResult| {
+        let own = |other: &&SuiteResult| {
+            other.suite == of.suite
+                && (&other.actor.experiment, other.actor.model()) == (&of.actor.experiment, of.actor.model())
+        };
+        results.iter().filter(own).map(|result| result.actor.train_tasks).max()
+    };
+    let of_seeds = |seeds: &[SuiteResult]| {
+        // The paper's figures are of its largest numbers of tasks.
+        let has_most = most_tasks(&seeds[0]) == Some(seeds[0].actor.train_tasks);
+        aggregate(seeds, if has_most { paper } else { &[] })
+    };
+    results.chunk_by(same).map(of_seeds).collect()
 }
 
 fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {

@@ -1,4 +1,6 @@
-//! `report.md`: the results as a table for a README or a terminal, and what made them.
+//! `report.md`: the results as tables for a README or a terminal, and what made them.
+
+mod glance;
 
 use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
@@ -8,9 +10,9 @@ use crate::report::summary::{Aggregate, FirstError, Report};
 use crate::report::tables::{self, ModelRow};
 
 /// A column: its name, and whether numbers stand in it.
-type Column = (&'static str, bool);
+type Column<'c> = (&'c str, bool);
 
-const COLUMNS: [Column; 11] = [
+const COLUMNS: [Column<'static>; 11] = [
     ("suite", false),
     ("model", false),
     ("tasks", true),
@@ -27,7 +29,8 @@ const COLUMNS: [Column; 11] = [
 /// The whole text.
 pub(super) fn render(report: &Report) -> String {
     let mut text = format!("**{}**: {}.\n", report.title, made_by(report));
-    let mut put = |columns: &[Column], rows: Vec<Vec<String>>| {
+    glance::glances(report).iter().for_each(|table| text.push_str(&format!("\n{table}")));
+    let mut put = |columns: &[Column<'_>], rows: Vec<Vec<String>>| {
         if !rows.is_empty() {
             text.push('\n');
             text.push_str(&table(columns, rows));
@@ -45,7 +48,7 @@ pub(super) fn render(report: &Report) -> String {
     text
 }
 
-const DETECTION_COLUMNS: [Column; 12] = [
+const DETECTION_COLUMNS: [Column<'static>; 12] = [
     ("suite", false),
     ("model", false),
     ("tasks", true),
@@ -78,7 +81,7 @@ fn detection(error: &DetectionError) -> Vec<String> {
     ]
 }
 
-const FAILURE_COLUMNS: [Column; 7] = [
+const FAILURE_COLUMNS: [Column<'static>; 7] = [
     ("suite", false),
     ("model", false),
     ("tasks", true),
@@ -109,7 +112,7 @@ fn most_first(mut counts: Vec<(u64, String)>) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
-const MODEL_COLUMNS: [Column; 6] = [
+const MODEL_COLUMNS: [Column<'static>; 6] = [
     ("experiment", false),
     ("model", false),
     ("tasks", true),
@@ -133,7 +136,7 @@ fn none() -> String {
     "-".to_owned()
 }
 
-const CLAIM_COLUMNS: [Column; 4] =
+const CLAIM_COLUMNS: [Column<'static>; 4] =
     [("the paper's claim", false), ("encoder", false), ("here", false), ("figures", false)];
 
 fn claim(claim: &Claim) -> Vec<String> {
@@ -202,7 +205,7 @@ fn row(row: &Aggregate) -> Vec<String> {
 }
 
 /// A table whose columns stand one below the other in plain text too.
-fn table(columns: &[Column], rows: Vec<Vec<String>>) -> String {
+fn table(columns: &[Column<'_>], rows: Vec<Vec<String>>) -> String {
     let width = |at: usize| {
         let cells = rows.iter().map(|row| row[at].chars().count());
         cells.chain([columns[at].0.chars().count(), 3]).max().unwrap_or(3)

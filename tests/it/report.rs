@@ -401,6 +401,27 @@ fn the_markdown_says_what_made_the_figures() {
 }
 
 #[test]
+fn the_markdown_begins_with_models_by_suite_and_the_papers_figures_beside_the_most_tasks() {
+    let mut few = rollouts("ntp", "stacking_unseen", 3, 4);
+    few.iter_mut().for_each(|row| row.train_tasks = 2);
+    let mut argmax = rollouts("ntp", "stacking_unseen", 1, 4);
+    argmax.iter_mut().for_each(|row| row.decoder = "argmax");
+    let most = rollouts("ntp", "stacking_unseen", 4, 4);
+    let topology = rollouts("ntp", "stacking_topology", 2, 4);
+    let run = Run::new(&[few, argmax, most, topology, rollouts("flat", "stacking_unseen", 0, 2)].concat());
+    run.make();
+    let text = run.text("report.md");
+    let glance: Vec<&str> = text.lines().skip(2).take(5).collect();
+    insta::assert_snapshot!(glance.join("\n"), @"
+    | model | tasks | stacking_unseen | stacking_topology |
+    | ----- | ----: | --------------: | ----------------: |
+    | ntp   |     4 |   1.000 (0.863) |             0.500 |
+    | ntp   |     2 |           0.750 |                 - |
+    | flat  |     4 |           0.000 |                 - |
+    ");
+}
+
+#[test]
 fn the_papers_figures_stand_for_both_encoders_and_all_lengths() {
     let values = paper_values();
     let rate = |variant: &str, suite: &str| {
