@@ -59,6 +59,21 @@ fn command(arguments: &[&str]) -> (i32, String) {
     (code, stderr)
 }
 
+/// Lets a command run for some time at most.
+fn killed(arguments: &[&str], after_millis: u64) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ntp"))
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(after_millis));
+    // A child that has already ended is fine.
+    let _ended = child.kill();
+    child.wait().unwrap();
+}
+
 /// A finished run; its folder.
 fn finished() -> (tempfile::TempDir, String, String) {
     let folder = tempfile::tempdir().unwrap();
@@ -87,20 +102,43 @@ fn a_run_with_pictures_killed_at_any_moment_carries_on_to_the_same_bytes() {
     for kill_after_millis in [100, 300, 500, 800, 1200] {
         let folder = tempfile::tempdir().unwrap();
         let [pipeline, out] = written(folder.path(), unchanged);
-        let mut child = Command::new(env!("CARGO_BIN_EXE_ntp"))
-            .args(["run", &pipeline, "--out", &out])
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(kill_after_millis));
-        // A child that has already ended is fine.
-        let _ended = child.kill();
-        child.wait().unwrap();
+        killed(&["run", &pipeline, "--out", &out], kill_after_millis);
         let (code, stderr) = command(&["run", &pipeline, "--out", &out]);
         assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
         assert_eq!(hashes(&folder.path().join("run"), &ALL), wanted, "killed after {kill_after_millis} ms");
+    }
+}
+
+/// The pipeline with both detectors in place of its model.
+fn detecting(text: &str) -> String {
+    let model = |variant: &str| {
+        format!(
+            "[[models]]\nvariant = \"{variant}\"\n[models.training]\nsteps = 4\ncheckpoint_every = 2\n\
+             [models.training.detector]\nsteps = 5\npictures = 8\n"
+        )
+    };
+    let (before, rest) = text.split_once("[[models]]").unwrap();
+    let (_, after) = rest.split_once("[rollout]").unwrap();
+    [before, &model("ntp_vid_detector"), &model("ntp_vid_detector_paper"), "[rollout]", after].concat()
+}
+
+#[test]
+fn detectors_are_trained_to_their_receipts_and_killed_at_any_moment_to_the_same_bytes() {
+    let whole = tempfile::tempdir().unwrap();
+    let [pipeline, out] = written(whole.path(), detecting);
+    let (code, stderr) = command(&["run", &pipeline, "--out", &out]);
+    assert_eq!(code, 0, "{stderr}");
+    let (code, told, _) = run(&["run", &pipeline, "--out", &out, "--dry-run"]);
+    assert_eq!(code, 0);
+    assert!(told.lines().count() > 6 && told.lines().all(|line| line.contains("up to date")), "{told}");
+    let wanted = hashes(&whole.path().join("run"), &["models"]);
+    for kill_after_millis in [600, 1000] {
+        let folder = tempfile::tempdir().unwrap();
+        let [pipeline, out] = written(folder.path(), detecting);
+        killed(&["run", &pipeline, "--out", &out], kill_after_millis);
+        let (code, stderr) = command(&["run", &pipeline, "--out", &out, "--to", "train"]);
+        assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
+        assert_eq!(hashes(&folder.path().join("run"), &["models"]), wanted, "killed after {kill_after_millis} ms");
     }
 }
 
