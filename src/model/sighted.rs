@@ -19,7 +19,7 @@
 
 use burn::module::{Module, ModuleDisplay};
 use burn::nn::Linear;
-use burn::tensor::activation::relu;
+use burn::tensor::activation::{leaky_relu, relu};
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,9 @@ const BUMP_GAIN: f32 = 8.0;
 /// small ones a percept's features get no gradient before names are tied to percepts, nor names before features tell the
 /// percept that is meant: a plateau at guessing, of some hundred steps or many more.
 const NAMING_BOUND: f32 = 0.4;
+/// What is left of a negative feature before names. With a rectifier the strong gradients of the first steps can silence
+/// every feature of every percept, and names are guessed for good.
+const NAMING_LEAK: f64 = 0.1;
 
 /// Widths of the encoder of videos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -310,7 +313,8 @@ impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
         let moving = Padding::mask_objects(padding, self.conv.forward(objects)).max_dim(1).squeeze_dim(1);
         let context = self.context.forward(Tensor::cat(vec![program, hidden], 1));
         let object = self.object.forward(Tensor::<3>::cat(vec![moving, last], 2)); // [B, K, H]
-        self.slots.forward(relu(object + context.unsqueeze_dim(1)).flatten::<2>(1, 2))
+        let told = leaky_relu(object + context.unsqueeze_dim(1), NAMING_LEAK);
+        self.slots.forward(told.flatten::<2>(1, 2))
     }
 }
 
