@@ -9,7 +9,7 @@ use std::path::Path;
 use burn::tensor::Tensor;
 use rand::Rng as _;
 use rand::seq::SliceRandom as _;
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use rayon::iter::{IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::DatasetTrials;
@@ -28,6 +28,9 @@ use crate::training::{Gallery, Hooks, Progress, TrainError};
 const GROUPS: usize = 2;
 /// Pictures of a trial in a group, at most.
 const OF_TRIAL: usize = 8;
+
+/// Trials whose pictures are in memory at a time while a finished detector looks at all of them; as many are made ready.
+const PORTION: usize = 64;
 
 /// One row of `detector_metrics.parquet`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -200,13 +203,21 @@ pub(super) fn detected<D: Detector>(
 ) -> Result<DatasetTrials, TrainError> {
     let detector = detector.clone().valid();
     let (width, height) = gallery.size();
-    let observations = (0..data.trials.len()).into_par_iter().map(|trial| {
+    let of_trial = |&trial: &usize| {
         let mut pictures = Pictures::of_size(width, height);
         let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
         fetch(data, gallery, trial, &frames, &mut pictures)?;
         Ok(detected_rows(&detector, &pictures))
-    });
-    let observations: Vec<Vec<f32>> = observations.collect::<Result<_, TrainError>>()?;
+    };
+    let trials: Vec<usize> = (0..data.trials.len()).collect();
+    let mut observations: Vec<Vec<f32>> = Vec::with_capacity(trials.len());
+    let mut portions = trials.chunks(PORTION).peekable();
+    portions.peek().into_iter().for_each(|first| gallery.announce(first));
+    while let Some(portion) = portions.next() {
+        // What was announced before the last is let go.
+        gallery.announce(portions.peek().copied().unwrap_or_default());
+        observations.extend(portion.par_iter().map(of_trial).collect::<Result<Vec<_>, TrainError>>()?);
+    }
     let mut detected = data.clone();
     detected.trials.iter_mut().zip(observations).for_each(|(trial, rows)| trial.observations = rows);
     Ok(detected)

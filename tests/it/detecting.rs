@@ -1,6 +1,7 @@
 //! Detectors: what they are told, how they are trained apart from what is behind them, and how their errors are measured.
 
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use burn::module::Module as _;
@@ -21,8 +22,8 @@ use ntp::table::{TableSchema, read};
 use ntp::task::{Family, Split, initial_state, scene};
 use ntp::trace::{Episode, GripperState, SpecificationForm};
 use ntp::training::{
-    DETECTOR_METRICS_FILE, DetectorTraining, Gallery as _, Hooks, Progress, TrainConfig, TrainError, TrainSummary,
-    Training, train_seeing,
+    DETECTOR_METRICS_FILE, DetectorTraining, Gallery, Hooks, Progress, TrainConfig, TrainError, TrainSummary, Training,
+    train_seeing,
 };
 
 use crate::kinematic::{demonstration, tower, trial};
@@ -86,6 +87,46 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     let truth = &shown.0.trials[0].observations[..found.len()];
     let mean = found.iter().zip(truth).map(|(found, truth)| (found - truth).abs()).sum::<f32>() / found.len() as f32;
     assert!(mean < 0.05, "{mean} m");
+}
+
+/// Paintings that note what is fetched without being among the last two announcements, once there is one.
+struct Watched<'p> {
+    paintings: &'p Paintings,
+    announced: Mutex<Vec<Vec<usize>>>,
+    surprises: Mutex<Vec<usize>>,
+}
+
+impl Gallery for Watched<'_> {
+    fn size(&self) -> (usize, usize) {
+        self.paintings.size()
+    }
+
+    fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
+        let announced = self.announced.lock().unwrap();
+        if !announced.is_empty() && !announced.iter().rev().take(2).flatten().any(|&other| other == trial) {
+            self.surprises.lock().unwrap().push(trial);
+        }
+        self.paintings.fetch(trial, frames, into)
+    }
+
+    fn announce(&self, trials: &[usize]) {
+        self.announced.lock().unwrap().push(trials.to_vec());
+    }
+}
+
+#[test]
+fn a_finished_detector_looks_at_all_trials_a_portion_at_a_time() {
+    let (data, paintings) = shown(70);
+    let watched = Watched { paintings: &paintings, announced: Mutex::default(), surprises: Mutex::default() };
+    let detector = DetectorTraining { steps: Some(2), pictures: Some(8), ..Default::default() };
+    let folder = tempfile::tempdir().unwrap();
+    let mut hooks = Hooks { on_progress: &mut |_| (), should_stop: &|| false };
+    train_seeing(&training(Variant::NtpVidDetector, 1, detector), &data, Some(&watched), folder.path(), &mut hooks)
+        .unwrap();
+    let announced = watched.announced.into_inner().unwrap();
+    assert!(announced.iter().all(|trials| trials.len() < 70), "all at once");
+    assert_eq!(announced.iter().flatten().filter(|&&trial| trial == 139).count(), 1);
+    assert_eq!(watched.surprises.into_inner().unwrap(), [0; 0]);
 }
 
 /// Pictures of a demonstration, and the same of a robot whose gripper is said to be elsewhere and the other way open.
