@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use arrow::buffer::ScalarBuffer;
 use serde::Serialize;
 
 use crate::dataset::DatasetError;
+use crate::dataset::call_facts::{CallFacts, CallFactsBatch, read_call_facts};
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
 use crate::dataset::layout::{self, EPISODES, FilePlace};
 use crate::dataset::schema::{CALLS, FRAMES};
-use crate::table::{Columns, Form, TableError, TextRows};
+use crate::table::{Columns, TableError};
 
 /// An episode as `ntp/episodes.parquet` and `ntp/calls/` have it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -45,27 +45,6 @@ pub struct EpisodeFacts {
     pub recording_index: i64,
     /// Every call, callers before callees.
     pub calls: Vec<CallFacts>,
-}
-
-/// One program call.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CallFacts {
-    /// Its number in the episode.
-    pub call_id: u32,
-    /// Who called it.
-    pub caller_id: Option<u32>,
-    /// 0 for the root.
-    pub depth: u8,
-    /// What was called.
-    pub program: String,
-    /// The slot that it was called with.
-    pub argument: Option<String>,
-    /// The frames of the specification that its caller saw, half-open.
-    pub input: [u32; 2],
-    /// Those that it may see itself.
-    pub output: Option<[u32; 2]>,
-    /// The episode's frames from call to return.
-    pub frames: [u32; 2],
 }
 
 /// One frame.
@@ -112,69 +91,6 @@ impl Batch for FrameBatch {
     }
 }
 
-struct CallBatch {
-    /// `episode_index`, `call_id`, `depth`.
-    numbers: [ScalarBuffer<i64>; 3],
-    caller_id: Vec<Option<i64>>,
-    program: TextRows,
-    argument: TextRows,
-    input: [ScalarBuffer<i64>; 2],
-    output: [Vec<Option<i64>>; 2],
-    frames: [ScalarBuffer<i64>; 2],
-}
-
-impl Batch for CallBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "episode_index",
-        "call_id",
-        "caller_id",
-        "depth",
-        "program",
-        "argument",
-        "input_begin",
-        "input_end",
-        "output_begin",
-        "output_end",
-        "frame_begin",
-        "frame_end",
-    ];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            numbers: [columns.numbers("episode_index")?, columns.numbers("call_id")?, columns.numbers("depth")?],
-            caller_id: columns.optional_int64("caller_id")?,
-            program: columns.text_rows("program", Form::Required)?,
-            argument: columns.text_rows("argument", Form::Optional)?,
-            input: [columns.numbers("input_begin")?, columns.numbers("input_end")?],
-            output: [columns.optional_int64("output_begin")?, columns.optional_int64("output_end")?],
-            frames: [columns.numbers("frame_begin")?, columns.numbers("frame_end")?],
-        })
-    }
-}
-
-impl CallBatch {
-    /// The call of a row, which should be the call `id` of an episode; else what is wrong with it.
-    fn facts(&self, at: usize, episode_index: i64, id: i64) -> Result<CallFacts, String> {
-        let [episode, call_id, depth] = self.numbers.each_ref().map(|column| column[at]);
-        if (episode, call_id) != (episode_index, id) {
-            let (found, expected) = ((episode, call_id), (episode_index, id));
-            return Err(format!("(episode_index, call_id) are {found:?}, but should be {expected:?}"));
-        }
-        let small = |number: i64| u32::try_from(number).map_err(|_range| format!("call {id} counts {number}"));
-        let span = |begin: i64, end: i64| Ok::<_, String>([small(begin)?, small(end)?]);
-        Ok(CallFacts {
-            call_id: small(call_id)?,
-            caller_id: self.caller_id[at].map(small).transpose()?,
-            depth: u8::try_from(depth).map_err(|_range| format!("depth is {depth}"))?,
-            program: self.program.row(at).to_owned(),
-            argument: self.argument.get(at).map(ToOwned::to_owned),
-            input: span(self.input[0][at], self.input[1][at])?,
-            output: self.output[0][at].zip(self.output[1][at]).map(|(begin, end)| span(begin, end)).transpose()?,
-            frames: span(self.frames[0][at], self.frames[1][at])?,
-        })
-    }
-}
-
 /// Looks up an episode, and one of its frames when it is asked for. Programs are taken as texts, so that datasets that
 /// were annotated elsewhere can be asked too.
 ///
@@ -194,17 +110,12 @@ pub fn look_up(
 
 /// The calls of an episode that was found.
 pub(super) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, DatasetError> {
-    let (row, mut cursor) = (&found.row, Cursor::<CallBatch>::new(root, layout::CALLS, CALLS));
+    let mut cursor = Cursor::<CallFactsBatch>::new(root, layout::CALLS, CALLS);
     let mut n_before = usize::try_from(found.calls_before).unwrap_or(0);
     while n_before > 0 {
-        n_before -= cursor.next_rows(row.calls, n_before)?.range.len();
+        n_before -= cursor.next_rows(found.row.calls, n_before)?.range.len();
     }
-    let call = |id: i64| {
-        let rows = cursor.next_rows(row.calls, 1)?;
-        let at = rows.range.start;
-        rows.batch.facts(at, row.episode_index, id).map_err(|problem| rows.problem(at, problem))
-    };
-    (0..row.n_calls).map(call).collect()
+    read_call_facts(&mut cursor, &found.row)
 }
 
 /// An episode, and how many rows lie before its own in the files of calls and frames.
