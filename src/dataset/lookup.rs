@@ -4,10 +4,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::artifact::read_json;
 use crate::dataset::DatasetError;
 use crate::dataset::call_facts::{CallFacts, CallFactsBatch, read_call_facts};
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::info::NtpInfo;
 use crate::dataset::layout::{self, EPISODES, FilePlace};
 use crate::dataset::schema::{CALLS, FRAMES};
 use crate::table::{Columns, TableError};
@@ -56,9 +58,10 @@ pub struct FrameFacts {
     pub index: i64,
     /// Its number among the recorded frames of the episode.
     pub recording_frame: i64,
-    /// Simulated time.
+    /// Simulated time; of imported datasets the time that they give.
     pub time_secs: f64,
-    /// Whether a primitive has just ended, or the episode begins.
+    /// Whether a primitive has just ended, or the episode begins. Where spans share no frame, as in imported datasets:
+    /// whether a call begins or has just ended.
     pub is_boundary: bool,
     /// The path of running programs, as the frame's label has it.
     pub program: String,
@@ -66,13 +69,41 @@ pub struct FrameFacts {
     pub stack: Vec<CallFacts>,
 }
 
-struct FrameBatch {
+/// What runs at each frame: columns that every dataset has.
+struct RunningBatch {
     index: Vec<i64>,
+    call_id: Vec<i64>,
+    program: Vec<String>,
+}
+
+impl RunningBatch {
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            index: columns.int64("index")?,
+            call_id: columns.int64("ntp.call_id")?,
+            program: columns.text("ntp.program")?,
+        })
+    }
+
+    /// What a row says of a frame; when it was, is left open.
+    fn facts(&self, at: usize, frame_index: i64, calls: &[CallFacts]) -> FrameFacts {
+        FrameFacts {
+            frame_index,
+            index: self.index[at],
+            recording_frame: 0,
+            time_secs: 0.0,
+            is_boundary: false,
+            program: self.program[at].clone(),
+            stack: stack(calls, self.call_id[at]),
+        }
+    }
+}
+
+struct FrameBatch {
+    running: RunningBatch,
     recording_frame: Vec<i64>,
     time_secs: Vec<f64>,
     boundary: Vec<bool>,
-    call_id: Vec<i64>,
-    program: Vec<String>,
 }
 
 impl Batch for FrameBatch {
@@ -81,13 +112,25 @@ impl Batch for FrameBatch {
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
-            index: columns.int64("index")?,
+            running: RunningBatch::take(columns)?,
             recording_frame: columns.int64("ntp.recording_frame")?,
             time_secs: columns.float64("ntp.time_secs")?,
             boundary: columns.boolean("ntp.boundary")?,
-            call_id: columns.int64("ntp.call_id")?,
-            program: columns.text("ntp.program")?,
         })
+    }
+}
+
+/// Frames that were annotated elsewhere.
+struct AnnotatedBatch {
+    running: RunningBatch,
+    timestamp: Vec<f32>,
+}
+
+impl Batch for AnnotatedBatch {
+    const COLUMNS: &'static [&'static str] = &["index", "timestamp", "ntp.call_id", "ntp.program"];
+
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self { running: RunningBatch::take(columns)?, timestamp: columns.float32("timestamp")? })
     }
 }
 
@@ -152,20 +195,39 @@ fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Re
         let problem = format!("there is no frame {frame}; it has {}, counted from 0", row.n_frames);
         return Err(DatasetError::Episode { path: root.join(EPISODES), episode: row.episode_index, problem });
     }
-    let mut cursor = Cursor::<FrameBatch>::new(root, layout::DATA, FRAMES);
-    for _ in 0..found.frames_before + frame as i64 {
-        cursor.next(row.data)?;
+    let frame = frame as i64;
+    let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
+    if ntp.annotated_by.is_none() {
+        return read_frame(root, found, frame, |batch: &FrameBatch, at| FrameFacts {
+            recording_frame: batch.recording_frame[at],
+            time_secs: batch.time_secs[at],
+            is_boundary: batch.boundary[at],
+            ..batch.running.facts(at, frame, calls)
+        });
     }
-    let (batch, at) = cursor.next(row.data)?;
-    Ok(FrameFacts {
-        frame_index: frame as i64,
-        index: batch.index[at],
-        recording_frame: batch.recording_frame[at],
-        time_secs: batch.time_secs[at],
-        is_boundary: batch.boundary[at],
-        program: batch.program[at].clone(),
-        stack: stack(calls, batch.call_id[at]),
+    // Its recording is the data that was imported: of that each frame is there.
+    read_frame(root, found, frame, |batch: &AnnotatedBatch, at| FrameFacts {
+        recording_frame: frame,
+        time_secs: f64::from(batch.timestamp[at]),
+        is_boundary: calls.iter().any(|call| call.frames.map(i64::from).contains(&frame)),
+        ..batch.running.facts(at, frame, calls)
     })
+}
+
+/// Reads the row of a frame.
+fn read_frame<B: Batch>(
+    root: &Path,
+    found: &Found,
+    frame: i64,
+    facts: impl FnOnce(&B, usize) -> FrameFacts,
+) -> Result<FrameFacts, DatasetError> {
+    let mut cursor = Cursor::<B>::new(root, layout::DATA, FRAMES);
+    let mut n_before = usize::try_from(found.frames_before + frame).unwrap_or(0);
+    while n_before > 0 {
+        n_before -= cursor.next_rows(found.row.data, n_before)?.range.len();
+    }
+    let (batch, at) = cursor.next(found.row.data)?;
+    Ok(facts(batch, at))
 }
 
 /// A call with all its callers, the root first.
