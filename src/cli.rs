@@ -8,7 +8,6 @@ use clap_complete::Shell;
 use crate::dataset::edit::Ending;
 use crate::dataset::export::LabelForm;
 use crate::pipeline::Stage;
-use crate::program::Program;
 use crate::publish::{Date, License, Place, Release};
 use crate::task::{Family, Split};
 
@@ -375,7 +374,7 @@ pub struct FilterArgs {
     pub family: Vec<Family>,
     /// A program that is called.
     #[arg(long, value_name = "PROGRAM")]
-    pub program: Vec<Program>,
+    pub program: Vec<String>,
     /// How it ended: success, failure, or a cause of failure.
     #[arg(long, value_name = "OUTCOME")]
     pub outcome: Vec<Ending>,

@@ -22,6 +22,7 @@
 //! Memory does not grow with the number of episodes, but for the distinct task texts. The same episodes give the same
 //! bytes.
 
+mod call_facts;
 mod call_rows;
 mod calls;
 mod config;
@@ -58,11 +59,12 @@ mod trial_data;
 mod validate;
 mod writer;
 
+pub use call_facts::CallFacts;
 pub use config::{ConvertConfig, FailedEpisodes, FrameChoice};
 pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
-pub use lookup::{CallFacts, EpisodeFacts, FrameFacts, look_up};
+pub use lookup::{EpisodeFacts, FrameFacts, look_up};
 pub use pictures::{Decoded, EpisodePictures, EpisodeRows, PictureLoader};
 pub use playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
 pub use read::read_trials;

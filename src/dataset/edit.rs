@@ -38,6 +38,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, IoError, Plan, Receipt, StageDir, StagedDir};
+use crate::dataset::layout;
 
 pub use condition::{Condition, Ending};
 pub use diff::{ChangedEpisode, Difference, EpisodeName, diff};
@@ -66,9 +67,13 @@ pub fn merge(sources: &[PathBuf], to: &Path) -> Result<EditSummary, EditError> {
 ///
 /// # Errors
 ///
-/// [`EditError::Refused`] when there are none.
+/// [`EditError::Refused`] when there are none, or a program that is asked for is none of the dataset's.
 pub fn filter(source: &Path, condition: &Condition, to: &Path) -> Result<EditSummary, EditError> {
     let source = Source::open(source)?;
+    if let Some(unknown) = condition.programs.iter().find(|program| !source.ntp.vocabulary.contains(program)) {
+        let problem = format!("there is no program {unknown:?}; allowed: {}", source.ntp.vocabulary.join(", "));
+        return Err(EditError::refused("edit.vocabulary", &source.root().join(layout::NTP_INFO), problem));
+    }
     let staged = StagedDir::begin(to)?;
     let settings = json!({ "condition": condition });
     let summary = write("filter", vec![source], staged.partial_path(), settings, |episode| condition.holds(episode))?;

@@ -8,7 +8,8 @@
 //! call of the sub-task's text. Frames with a negative `subtask_index` are the root's own.
 //!
 //! Spans of such a dataset share no frame: a call has the frames that are annotated so. Demonstrations are taken for
-//! successes, as nothing says otherwise.
+//! successes, as nothing says otherwise. An episode's recording is the file of frames that it was read from, by name
+//! and hash, and a task is named by its text: so imported datasets can be edited and compared as our own are.
 //!
 //! # Errors
 //!
@@ -70,7 +71,7 @@ pub fn import(root: &Path, to: &Path) -> Result<ImportSummary, EditError> {
         fps.ok_or_else(|| EditError::refused("import.rows", &root.join(layout::INFO), "fps is no number above 0"))?;
     let mut rows = AnnotatedRows::create(folder, &tasks, &subtasks, fps)?;
     write_frames(root, folder, &subtasks, &mut rows)?;
-    write_meta(root, folder, rows.lengths())?;
+    write_meta(root, folder, &tasks, rows.lengths())?;
     let summary = rows.finish()?;
     let expected = (info["total_episodes"].as_u64(), info["total_frames"].as_u64());
     if expected != (Some(summary.episodes), Some(summary.frames)) {
@@ -102,6 +103,13 @@ fn read_info(root: &Path) -> Result<Value, EditError> {
     Ok(info)
 }
 
+/// The programs of annotated episodes, with the hash that names them.
+pub(crate) fn vocabulary(subtasks: &[String]) -> (Vec<String>, String) {
+    let programs: Vec<String> = std::iter::once(ROOT.to_owned()).chain(subtasks.iter().cloned()).collect();
+    let hash = sha256_bytes(programs.join("\n").as_bytes())[..16].to_owned();
+    (programs, hash)
+}
+
 fn write_texts(root: &Path, to: &Path, tasks: &[String], subtasks: &[String]) -> Result<(), EditError> {
     write_tasks(to, tasks)?;
     write_subtasks(to, subtasks)?;
@@ -131,7 +139,7 @@ fn write_infos(
         return Err(EditError::refused("import.features", &root.join(layout::INFO), error.to_string()));
     }
     write_json(&to.join(layout::INFO), &info)?;
-    let vocabulary: Vec<String> = std::iter::once(ROOT.to_owned()).chain(subtasks.iter().cloned()).collect();
+    let (vocabulary, vocabulary_hash) = vocabulary(subtasks);
     let ntp = NtpInfo {
         schema_version: NTP_VERSION,
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -139,7 +147,7 @@ fn write_infos(
         families: Vec::new(),
         n_slots: 0,
         slots: Vec::new(),
-        vocabulary_hash: sha256_bytes(vocabulary.join("\n").as_bytes())[..16].to_owned(),
+        vocabulary_hash,
         vocabulary,
         total_calls: summary.calls,
         total_scopes: summary.scopes,

@@ -2,15 +2,17 @@
 
 use std::path::Path;
 
-use arrow::buffer::ScalarBuffer;
 use serde::Serialize;
 
+use crate::artifact::read_json;
 use crate::dataset::DatasetError;
+use crate::dataset::call_facts::{CallFacts, CallFactsBatch, read_call_facts};
 use crate::dataset::cursor::{Batch, Cursor};
 use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::info::NtpInfo;
 use crate::dataset::layout::{self, EPISODES, FilePlace};
 use crate::dataset::schema::{CALLS, FRAMES};
-use crate::table::{Columns, Form, TableError, TextRows};
+use crate::table::{Columns, TableError};
 
 /// An episode as `ntp/episodes.parquet` and `ntp/calls/` have it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -47,27 +49,6 @@ pub struct EpisodeFacts {
     pub calls: Vec<CallFacts>,
 }
 
-/// One program call.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CallFacts {
-    /// Its number in the episode.
-    pub call_id: u32,
-    /// Who called it.
-    pub caller_id: Option<u32>,
-    /// 0 for the root.
-    pub depth: u8,
-    /// What was called.
-    pub program: String,
-    /// The slot that it was called with.
-    pub argument: Option<String>,
-    /// The frames of the specification that its caller saw, half-open.
-    pub input: [u32; 2],
-    /// Those that it may see itself.
-    pub output: Option<[u32; 2]>,
-    /// The episode's frames from call to return.
-    pub frames: [u32; 2],
-}
-
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameFacts {
@@ -77,9 +58,10 @@ pub struct FrameFacts {
     pub index: i64,
     /// Its number among the recorded frames of the episode.
     pub recording_frame: i64,
-    /// Simulated time.
+    /// Simulated time; of imported datasets the time that they give.
     pub time_secs: f64,
-    /// Whether a primitive has just ended, or the episode begins.
+    /// Whether a primitive has just ended, or the episode begins. Where spans share no frame, as in imported datasets:
+    /// whether a call begins or has just ended.
     pub is_boundary: bool,
     /// The path of running programs, as the frame's label has it.
     pub program: String,
@@ -87,13 +69,41 @@ pub struct FrameFacts {
     pub stack: Vec<CallFacts>,
 }
 
-struct FrameBatch {
+/// What runs at each frame: columns that every dataset has.
+struct RunningBatch {
     index: Vec<i64>,
+    call_id: Vec<i64>,
+    program: Vec<String>,
+}
+
+impl RunningBatch {
+    fn take(columns: &mut Columns) -> Result<Self, TableError> {
+        Ok(Self {
+            index: columns.int64("index")?,
+            call_id: columns.int64("ntp.call_id")?,
+            program: columns.text("ntp.program")?,
+        })
+    }
+
+    /// What a row says of a frame; when it was, is left open.
+    fn facts(&self, at: usize, frame_index: i64, calls: &[CallFacts]) -> FrameFacts {
+        FrameFacts {
+            frame_index,
+            index: self.index[at],
+            recording_frame: 0,
+            time_secs: 0.0,
+            is_boundary: false,
+            program: self.program[at].clone(),
+            stack: stack(calls, self.call_id[at]),
+        }
+    }
+}
+
+struct FrameBatch {
+    running: RunningBatch,
     recording_frame: Vec<i64>,
     time_secs: Vec<f64>,
     boundary: Vec<bool>,
-    call_id: Vec<i64>,
-    program: Vec<String>,
 }
 
 impl Batch for FrameBatch {
@@ -102,76 +112,25 @@ impl Batch for FrameBatch {
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
         Ok(Self {
-            index: columns.int64("index")?,
+            running: RunningBatch::take(columns)?,
             recording_frame: columns.int64("ntp.recording_frame")?,
             time_secs: columns.float64("ntp.time_secs")?,
             boundary: columns.boolean("ntp.boundary")?,
-            call_id: columns.int64("ntp.call_id")?,
-            program: columns.text("ntp.program")?,
         })
     }
 }
 
-struct CallBatch {
-    /// `episode_index`, `call_id`, `depth`.
-    numbers: [ScalarBuffer<i64>; 3],
-    caller_id: Vec<Option<i64>>,
-    program: TextRows,
-    argument: TextRows,
-    input: [ScalarBuffer<i64>; 2],
-    output: [Vec<Option<i64>>; 2],
-    frames: [ScalarBuffer<i64>; 2],
+/// Frames that were annotated elsewhere.
+struct AnnotatedBatch {
+    running: RunningBatch,
+    timestamp: Vec<f32>,
 }
 
-impl Batch for CallBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "episode_index",
-        "call_id",
-        "caller_id",
-        "depth",
-        "program",
-        "argument",
-        "input_begin",
-        "input_end",
-        "output_begin",
-        "output_end",
-        "frame_begin",
-        "frame_end",
-    ];
+impl Batch for AnnotatedBatch {
+    const COLUMNS: &'static [&'static str] = &["index", "timestamp", "ntp.call_id", "ntp.program"];
 
     fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            numbers: [columns.numbers("episode_index")?, columns.numbers("call_id")?, columns.numbers("depth")?],
-            caller_id: columns.optional_int64("caller_id")?,
-            program: columns.text_rows("program", Form::Required)?,
-            argument: columns.text_rows("argument", Form::Optional)?,
-            input: [columns.numbers("input_begin")?, columns.numbers("input_end")?],
-            output: [columns.optional_int64("output_begin")?, columns.optional_int64("output_end")?],
-            frames: [columns.numbers("frame_begin")?, columns.numbers("frame_end")?],
-        })
-    }
-}
-
-impl CallBatch {
-    /// The call of a row, which should be the call `id` of an episode; else what is wrong with it.
-    fn facts(&self, at: usize, episode_index: i64, id: i64) -> Result<CallFacts, String> {
-        let [episode, call_id, depth] = self.numbers.each_ref().map(|column| column[at]);
-        if (episode, call_id) != (episode_index, id) {
-            let (found, expected) = ((episode, call_id), (episode_index, id));
-            return Err(format!("(episode_index, call_id) are {found:?}, but should be {expected:?}"));
-        }
-        let small = |number: i64| u32::try_from(number).map_err(|_range| format!("call {id} counts {number}"));
-        let span = |begin: i64, end: i64| Ok::<_, String>([small(begin)?, small(end)?]);
-        Ok(CallFacts {
-            call_id: small(call_id)?,
-            caller_id: self.caller_id[at].map(small).transpose()?,
-            depth: u8::try_from(depth).map_err(|_range| format!("depth is {depth}"))?,
-            program: self.program.row(at).to_owned(),
-            argument: self.argument.get(at).map(ToOwned::to_owned),
-            input: span(self.input[0][at], self.input[1][at])?,
-            output: self.output[0][at].zip(self.output[1][at]).map(|(begin, end)| span(begin, end)).transpose()?,
-            frames: span(self.frames[0][at], self.frames[1][at])?,
-        })
+        Ok(Self { running: RunningBatch::take(columns)?, timestamp: columns.float32("timestamp")? })
     }
 }
 
@@ -194,17 +153,12 @@ pub fn look_up(
 
 /// The calls of an episode that was found.
 pub(super) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, DatasetError> {
-    let (row, mut cursor) = (&found.row, Cursor::<CallBatch>::new(root, layout::CALLS, CALLS));
+    let mut cursor = Cursor::<CallFactsBatch>::new(root, layout::CALLS, CALLS);
     let mut n_before = usize::try_from(found.calls_before).unwrap_or(0);
     while n_before > 0 {
-        n_before -= cursor.next_rows(row.calls, n_before)?.range.len();
+        n_before -= cursor.next_rows(found.row.calls, n_before)?.range.len();
     }
-    let call = |id: i64| {
-        let rows = cursor.next_rows(row.calls, 1)?;
-        let at = rows.range.start;
-        rows.batch.facts(at, row.episode_index, id).map_err(|problem| rows.problem(at, problem))
-    };
-    (0..row.n_calls).map(call).collect()
+    read_call_facts(&mut cursor, &found.row)
 }
 
 /// An episode, and how many rows lie before its own in the files of calls and frames.
@@ -241,20 +195,39 @@ fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Re
         let problem = format!("there is no frame {frame}; it has {}, counted from 0", row.n_frames);
         return Err(DatasetError::Episode { path: root.join(EPISODES), episode: row.episode_index, problem });
     }
-    let mut cursor = Cursor::<FrameBatch>::new(root, layout::DATA, FRAMES);
-    for _ in 0..found.frames_before + frame as i64 {
-        cursor.next(row.data)?;
+    let frame = frame as i64;
+    let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
+    if ntp.annotated_by.is_none() {
+        return read_frame(root, found, frame, |batch: &FrameBatch, at| FrameFacts {
+            recording_frame: batch.recording_frame[at],
+            time_secs: batch.time_secs[at],
+            is_boundary: batch.boundary[at],
+            ..batch.running.facts(at, frame, calls)
+        });
     }
-    let (batch, at) = cursor.next(row.data)?;
-    Ok(FrameFacts {
-        frame_index: frame as i64,
-        index: batch.index[at],
-        recording_frame: batch.recording_frame[at],
-        time_secs: batch.time_secs[at],
-        is_boundary: batch.boundary[at],
-        program: batch.program[at].clone(),
-        stack: stack(calls, batch.call_id[at]),
+    // Its recording is the data that was imported: of that each frame is there.
+    read_frame(root, found, frame, |batch: &AnnotatedBatch, at| FrameFacts {
+        recording_frame: frame,
+        time_secs: f64::from(batch.timestamp[at]),
+        is_boundary: calls.iter().any(|call| call.frames.map(i64::from).contains(&frame)),
+        ..batch.running.facts(at, frame, calls)
     })
+}
+
+/// Reads the row of a frame.
+fn read_frame<B: Batch>(
+    root: &Path,
+    found: &Found,
+    frame: i64,
+    facts: impl FnOnce(&B, usize) -> FrameFacts,
+) -> Result<FrameFacts, DatasetError> {
+    let mut cursor = Cursor::<B>::new(root, layout::DATA, FRAMES);
+    let mut n_before = usize::try_from(found.frames_before + frame).unwrap_or(0);
+    while n_before > 0 {
+        n_before -= cursor.next_rows(found.row.data, n_before)?.range.len();
+    }
+    let (batch, at) = cursor.next(found.row.data)?;
+    Ok(facts(batch, at))
 }
 
 /// A call with all its callers, the root first.

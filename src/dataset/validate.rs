@@ -26,7 +26,7 @@ use crate::trace::ProgramCall;
 use episode::{ArgumentBatch, EpisodeCheck};
 use frames::{FrameCheck, FullFrameBatch};
 use meta::Texts;
-use scopes::ScopeBatch;
+use scopes::{Labelled, ScopeBatch};
 
 /// Checks a dataset.
 ///
@@ -162,7 +162,9 @@ impl Tables {
 
     fn check_scopes(&mut self, row: &EpisodeRow, calls: Option<&Vec<ProgramCall>>, validation: &mut Validation) {
         let (Some(cursor), Some(calls)) = (&mut self.scopes, calls) else { return };
-        if let Err(error) = scopes::check(cursor, row, calls, validation) {
+        let labelled =
+            calls.iter().filter_map(|call| Some(Labelled { call: call.id.0, input: call.input, output: call.output? }));
+        if let Err(error) = scopes::check(cursor, row, labelled, validation) {
             validation.failed("scopes.row", &error);
             self.scopes = None;
         }

@@ -164,7 +164,11 @@ fn filtering_gives_what_converting_the_wanted_episodes_would() {
         ("cause", Condition { outcomes: vec![Ending::Cause(Cause::MissedGrasp)], ..Condition::default() }, &[2]),
         ("short", Condition { max_frames: Some(5), ..Condition::default() }, &[2, 3]),
         ("long", Condition { min_frames: Some(6), max_frames: Some(9), ..Condition::default() }, &[0, 1]),
-        ("program", Condition { programs: vec![Program::BlockStacking], ..Condition::default() }, &[0, 1, 2, 3, 4, 5]),
+        (
+            "program",
+            Condition { programs: vec![Program::BlockStacking.name().to_owned()], ..Condition::default() },
+            &[0, 1, 2, 3, 4, 5],
+        ),
         (
             "both",
             Condition { outcomes: vec![Ending::Failure], split: Some(Split::Unseen), ..Condition::default() },
@@ -186,7 +190,7 @@ fn filtering_gives_what_converting_the_wanted_episodes_would() {
         assert_eq!(stats(&found)["observation.state"], stats(expected.path())["observation.state"], "{name}");
         assert_eq!(stats(&found)["index"], stats(expected.path())["index"], "{name}");
     }
-    let none = Condition { programs: vec![Program::ObjectSorting], ..Condition::default() };
+    let none = Condition { programs: vec![Program::ObjectSorting.name().to_owned()], ..Condition::default() };
     refused(filter(&root, &none, &folder.path().join("none")), "edit.empty", "no episode is left");
     assert!(!folder.path().join("none").exists() && !folder.path().join(".partial-none").exists());
 }

@@ -3,13 +3,18 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
-use ntp::artifact::read_json;
+use arrow::array::{ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
+use arrow::compute::concat_batches;
+use arrow::datatypes::Int64Type;
+use ntp::artifact::{read_json, sha256_file};
+use ntp::dataset::edit::{Condition, EditError, SplitBy, diff, filter, merge, repair, split};
 use ntp::dataset::export::{LabelForm, export};
 use ntp::dataset::import::import;
 use ntp::dataset::{ConvertConfig, schema, summarize, validate};
+use ntp::lineage::explain_episode;
 use ntp::table::{self, Column, TableSchema};
 use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use re_lerobot::datasetv3::LeRobotDatasetV3;
 use serde_json::{Value, json};
 
@@ -156,4 +161,108 @@ fn what_is_not_annotated_is_refused_by_name() {
     convert_all(&episodes(), &ConvertConfig::default(), own.path()).unwrap();
     let error = import(own.path(), &to).unwrap_err().to_string();
     assert!(error.starts_with("import.annotation"), "{error}");
+}
+
+/// A dataset that was imported, with three frames that are annotated by nothing, and a declaration of theirs.
+fn imported(folder: &Path, name: &str, change: impl FnOnce(&Path)) -> std::path::PathBuf {
+    let (source, to) = (folder.join(format!("{name}-theirs")), folder.join(name));
+    theirs(&source);
+    rewrite_any(&source.join(DATA), "subtask_index", |rows| rows[..3].fill(-1));
+    change_info(&source, |info| info["tools"] = json!([{ "type": "function" }]));
+    change(&source);
+    import(&source, &to).unwrap();
+    to
+}
+
+/// Changes a column of numbers of a table that is not of our schemas.
+fn rewrite_any(path: &Path, name: &str, change: impl FnOnce(&mut Vec<i64>)) {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(path).unwrap()).unwrap().build().unwrap();
+    let batches: Vec<RecordBatch> = reader.map(Result::unwrap).collect();
+    let rows = concat_batches(&batches[0].schema(), &batches).unwrap();
+    let at = rows.schema().index_of(name).unwrap();
+    let mut numbers = rows.column(at).as_primitive::<Int64Type>().values().to_vec();
+    change(&mut numbers);
+    let mut columns = rows.columns().to_vec();
+    columns[at] = Arc::new(Int64Array::from(numbers));
+    let rows = RecordBatch::try_new(rows.schema(), columns).unwrap();
+    let mut writer = ArrowWriter::try_new(std::fs::File::create(path).unwrap(), rows.schema(), None).unwrap();
+    writer.write(&rows).unwrap();
+    writer.close().unwrap();
+}
+
+#[test]
+fn an_imported_dataset_is_split_and_merged_to_what_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = imported(folder.path(), "whole", |_| {});
+    let parts = folder.path().join("parts");
+    split(&whole, &SplitBy::Task, &parts).unwrap();
+    let mut parts: Vec<_> = std::fs::read_dir(&parts).unwrap().map(|entry| entry.unwrap().path()).collect();
+    parts.sort();
+    assert_eq!(parts.len(), 3);
+    let merged = folder.path().join("merged");
+    let summary = merge(&parts, &merged).unwrap();
+    assert_eq!((summary.episodes, summary.tasks), (6, 3));
+    for dataset in parts.iter().chain([&merged]) {
+        assert_eq!(validate(dataset).findings, []);
+        let info: Value = read_json(&dataset.join("meta/info.json")).unwrap();
+        assert_eq!(info["tools"], json!([{ "type": "function" }]));
+        LeRobotDatasetV3::load_from_directory(dataset).unwrap();
+    }
+    let difference = diff(&whole, &merged).unwrap();
+    assert_eq!((difference.same, difference.changed), (6, 0));
+    let vocabulary = |root: &Path| {
+        let info: Value = read_json(&root.join("ntp/info.json")).unwrap();
+        let mut programs: Vec<String> = serde_json::from_value(info["vocabulary"].clone()).unwrap();
+        programs.sort();
+        programs
+    };
+    assert_eq!(vocabulary(&merged), vocabulary(&whole));
+    let filtered = folder.path().join("filtered");
+    let condition = Condition { programs: vec!["block_stacking".to_owned()], ..Condition::default() };
+    assert!(filter(&whole, &condition, &filtered).unwrap().episodes > 0);
+    let unknown = Condition { programs: vec!["pick".to_owned()], ..Condition::default() };
+    let error = filter(&whole, &unknown, &folder.path().join("none")).unwrap_err().to_string();
+    assert!(error.starts_with("edit.vocabulary") && error.contains("block_stacking"), "{error}");
+    assert_eq!(validate(&filtered).findings, []);
+}
+
+#[test]
+fn imported_datasets_are_merged_unless_an_episode_is_there_twice_or_they_are_none_of_the_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = imported(folder.path(), "first", |_| {});
+    let other =
+        imported(folder.path(), "other", |root| rewrite_any(&root.join(DATA), "subtask_index", |rows| rows[4] = -1));
+    let merged = folder.path().join("merged");
+    assert_eq!(merge(&[first.clone(), other], &merged).unwrap().episodes, 12);
+    assert_eq!(validate(&merged).findings, []);
+    let refused = |error: EditError, code: &str| assert!(error.to_string().starts_with(code), "{error} is no {code}");
+    let to = folder.path().join("refused");
+    let again = imported(folder.path(), "again", |_| {});
+    refused(merge(&[first.clone(), again], &to).unwrap_err(), "edit.episode");
+    let own = folder.path().join("own");
+    convert_all(&episodes(), &ConvertConfig::default(), &own).unwrap();
+    refused(merge(&[first.clone(), own], &to).unwrap_err(), "edit.vocabulary");
+    rewrite(&first, CALLS, &schema::CALLS, |columns| {
+        let at = columns.iter().position(|(name, _)| name == "frame_end").unwrap();
+        let Column::Int64(rows) = &mut columns[at].1 else { panic!() };
+        rows[0] += 1;
+    });
+    refused(repair(&first, &to).unwrap_err(), "edit.vocabulary");
+    assert!(!to.exists());
+}
+
+#[test]
+fn a_frame_of_an_imported_dataset_leads_to_the_file_that_it_was_read_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = imported(folder.path(), "whole", |_| {});
+    let source = folder.path().join("whole-theirs");
+    let found = explain_episode(&whole, 2, Some(1), std::slice::from_ref(&source)).unwrap();
+    let frame = found.frame.unwrap();
+    assert_eq!(frame.program, "task/pick_and_place block_D block_B");
+    let stack: Vec<_> = frame.stack.iter().map(|call| (call.program.as_str(), call.frames)).collect();
+    assert_eq!(stack, [("task", [0, 5]), ("pick_and_place block_D block_B", [0, 4])]);
+    assert_eq!((frame.frame_index, frame.recording_frame, frame.is_boundary), (1, 1, false));
+    assert!(explain_episode(&whole, 2, Some(4), &[]).unwrap().frame.unwrap().is_boundary);
+    assert_eq!((found.recording.file.as_str(), found.recording.path), (DATA, Some(source.join(DATA))));
+    assert_eq!(found.episode.recording_sha256, sha256_file(&source.join(DATA)).unwrap());
 }

@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::dataset::edit::source::SourceEpisode;
-use crate::program::Program;
 use crate::task::{Family, Split};
 use crate::trace::Cause;
 
@@ -27,9 +26,9 @@ pub struct Condition {
     /// Families of tasks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub families: Vec<Family>,
-    /// Programs of which one is called.
+    /// Programs of which one is called, by their names.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub programs: Vec<Program>,
+    pub programs: Vec<String>,
     /// How it ended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outcomes: Vec<Ending>,
@@ -91,6 +90,6 @@ impl Condition {
             && self.split.is_none_or(|split| split.name() == row.split)
             && self.min_frames.is_none_or(|least| n_frames >= least)
             && self.max_frames.is_none_or(|most| n_frames <= most)
-            && any(self.programs.is_empty(), self.programs.iter().any(|of| episode.calls_program(of.name())))
+            && any(self.programs.is_empty(), self.programs.iter().any(|of| episode.calls_program(of)))
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = format!("schema_version is {}, but {NTP_VERSION} is edited", ntp.schema_version);
         return refused("edit.version", layout::NTP_INFO, problem);
     }
-    if ntp.vocabulary_hash != vocabulary_hash() {
+    if ntp.annotated_by.is_none() && ntp.vocabulary_hash != vocabulary_hash() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }
@@ -66,6 +66,11 @@ pub(super) fn check_like(first: &Source, other: &Source) -> Result<(), EditError
     if info.fps != first.info.fps {
         let problem = of_first(format!("fps is {}", info.fps), first.info.fps.to_string());
         return refused("edit.fps", layout::INFO, problem);
+    }
+    if ntp.annotated_by != first.ntp.annotated_by {
+        let by = |source: &Source| source.ntp.annotated_by.clone().unwrap_or_else(|| "an expert of ours".to_owned());
+        let problem = of_first(format!("its programs are annotated by {}", by(other)), by(first));
+        return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }
     if ntp.frames != first.ntp.frames {
         let problem = of_first(format!("frames is {:?}", ntp.frames), format!("{:?}", first.ntp.frames));

@@ -114,6 +114,10 @@ impl Prefix {
         let checks = EpisodeChecks::new(root, &info)?;
         let source = Source::with_rows(root, info, rows)?;
         check_version(&source)?;
+        if let Some(by) = &source.ntp.annotated_by {
+            let problem = format!("its programs are annotated by {by}: import the dataset that it was made of again");
+            return Err(EditError::refused("edit.vocabulary", &root.join(layout::NTP_INFO), problem));
+        }
         Ok(Self { source, checks, changed })
     }
 

@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use arrow::array::AsArray as _;
 use arrow::datatypes::Int64Type;
+use serde_json::Value;
 
+use crate::artifact::read_json;
 use crate::dataset::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::cursor::BatchCursor;
@@ -79,6 +81,8 @@ pub struct EditSummary {
 pub(super) struct Target {
     root: PathBuf,
     info: Info,
+    /// `meta/info.json` of an imported dataset as it is: others declare more than we know of.
+    theirs: Option<Value>,
     ntp: NtpInfo,
     features: Vec<NumericFeature>,
     statistics: Statistics,
@@ -107,6 +111,7 @@ impl Target {
     /// Begins a dataset with the tables of a source.
     pub(super) fn create(root: &Path, like: &Source) -> Result<Self, EditError> {
         let (info, ntp, cursors) = (like.info.clone(), like.ntp.clone(), &like.cursors);
+        let theirs = ntp.annotated_by.as_ref().map(|_| read_json(&like.root().join(layout::INFO))).transpose()?;
         let file_bytes = info.data_files_size_in_mb as usize * MEGABYTE;
         let rolling = |names, cursor: &BatchCursor, options| {
             RollingBatches::new(root, names, cursor.schema().clone(), options, file_bytes)
@@ -134,6 +139,7 @@ impl Target {
             meta_files: rolling((layout::META_EPISODES, META_EPISODES.name()), &cursors.meta, MetaRows::options()),
             provenance_file: BatchWriter::create(&episodes, EPISODES.name(), columns, WriteOptions::default())?,
             info,
+            theirs,
             ntp,
             summary: EditSummary::default(),
         })
@@ -237,13 +243,15 @@ impl Target {
         let known: &[i64] = column.map_or(&[], |column| column.values());
         let used: BTreeSet<i64> = known.iter().copied().collect();
         let text = |index: i64| usize::try_from(index).ok().and_then(|index| source.subtasks.get(index));
-        if let Some(unknown) = used.iter().find(|&&index| text(index).is_none()) {
+        // What is annotated elsewhere has no sub-task where the number is negative.
+        let is_none = |index: i64| index < 0 && source.ntp.annotated_by.is_some();
+        if let Some(unknown) = used.iter().find(|&&index| text(index).is_none() && !is_none(index)) {
             let problem = format!("subtask_index is {unknown}, but there are {}", source.subtasks.len());
             return Err(EditError::refused("edit.columns", &source.root().join(layout::DATA), problem));
         }
         let keys: Vec<(i64, i64)> =
             used.into_iter().filter_map(|index| Some((index, i64::from(self.subtasks.key(text(index)?))))).collect();
-        let key = |index: &i64| keys.iter().find(|(known, _)| known == index).map_or(0, |(_, key)| *key);
+        let key = |index: &i64| keys.iter().find(|(known, _)| known == index).map_or(*index, |(_, key)| *key);
         self.frames.numbers[3].extend(known.iter().map(key));
         Ok(())
     }

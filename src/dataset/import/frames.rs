@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Int64Type};
 
+use crate::artifact::sha256_file;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::with_columns;
 use crate::dataset::import::ROOT;
@@ -24,6 +25,8 @@ pub(super) struct Annotated {
     pub(super) task_index: i64,
     pub(super) n_frames: i64,
     pub(super) data: FilePlace,
+    /// SHA-256 of the file that it was read from.
+    pub(super) source: Arc<str>,
     /// Runs of frames of one sub-task: which, and the frames, half-open.
     pub(super) runs: Vec<(usize, i64, i64)>,
 }
@@ -38,10 +41,11 @@ pub(super) fn write_frames(
     subtasks: &[String],
     rows: &mut AnnotatedRows,
 ) -> Result<(), EditError> {
-    let mut walk = Walk { subtasks, rows, open: None, n_episodes: 0, n_frames: 0 };
+    let mut walk = Walk { subtasks, rows, source: Arc::default(), open: None, n_episodes: 0, n_frames: 0 };
     let mut place = FilePlace::default();
     while place == FilePlace::default() || place.in_dataset(root, layout::DATA).exists() {
         let path = place.in_dataset(root, layout::DATA);
+        walk.source = sha256_file(&path)?.into();
         let mut reader = BatchReader::open(&path, BATCH_ROWS)?;
         let mut writer: Option<BatchWriter> = None;
         while let Some(batch) = reader.next_batch()? {
@@ -65,6 +69,8 @@ pub(super) fn write_frames(
 struct Walk<'w> {
     subtasks: &'w [String],
     rows: &'w mut AnnotatedRows,
+    /// Hash of the file that is being read.
+    source: Arc<str>,
     open: Option<Annotated>,
     n_episodes: i64,
     n_frames: i64,
@@ -104,7 +110,9 @@ impl Walk<'_> {
     ) -> Result<Option<usize>, String> {
         if self.open.as_ref().is_none_or(|open| open.episode_index != episode) {
             self.close().map_err(|error| error.to_string())?;
-            let begun = Annotated { episode_index: episode, task_index: task, data: place, ..Annotated::default() };
+            let source = Arc::clone(&self.source);
+            let begun =
+                Annotated { episode_index: episode, task_index: task, data: place, source, ..Annotated::default() };
             self.open = Some(begun);
             self.n_episodes += 1;
         }

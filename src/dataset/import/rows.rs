@@ -7,6 +7,7 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, AsArray as _, BooleanArray, Int64Array, RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field};
 
+use crate::artifact::sha256_bytes;
 use crate::dataset::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::{copy_files, with_columns};
@@ -29,7 +30,7 @@ pub(super) struct AnnotatedRows {
     scopes: RollingTable,
     episodes: TableWriter,
     /// How many episodes of each task there were.
-    trials: BTreeMap<i64, i64>,
+    trials: BTreeMap<String, i64>,
     lengths: Vec<(i64, i64)>,
     summary: ImportSummary,
 }
@@ -127,7 +128,7 @@ impl AnnotatedRows {
             let problem = format!("task_index is {}, but there are {}", episode.task_index, self.tasks.len());
             return Err(EditError::refused("import.rows", Path::new(layout::DATA), problem));
         };
-        let trial = self.trials.entry(episode.task_index).or_default();
+        let trial = self.trials.entry(text.clone()).or_default();
         let (call_place, scope_place) = (self.calls.place(), self.scopes.place());
         let number = |number: i64| Column::Int64(vec![number]);
         let word = |word: &str| Column::Text(vec![word.to_owned()]);
@@ -135,7 +136,7 @@ impl AnnotatedRows {
         let columns = [
             ("episode_index", number(episode.episode_index)),
             ("seed", word("0")),
-            ("task_id", word(&task_id(episode.task_index))),
+            ("task_id", word(&task_id(&text))),
             ("task_text", word(&text)),
             ("family", word("annotated")),
             ("split", word("seen")),
@@ -145,8 +146,8 @@ impl AnnotatedRows {
             ("outcome", word("success")),
             ("cause", Column::OptionalText(vec![None])),
             ("success", Column::Boolean(vec![true])),
-            ("recording", word("")),
-            ("recording_sha256", word("")),
+            ("recording", word(&episode.data.relative(layout::DATA))),
+            ("recording_sha256", word(&episode.source)),
             ("recording_index", number(episode.episode_index)),
             ("n_frames", number(n_frames)),
             ("n_recorded_frames", number(n_frames)),
@@ -193,18 +194,20 @@ fn calls(episode: &Annotated) -> Vec<Call> {
         .collect()
 }
 
-fn task_id(task_index: i64) -> String {
-    format!("task_{task_index:04}")
+/// Names a task by its text, so that it has one name in all datasets.
+fn task_id(text: &str) -> String {
+    format!("task_{}", &sha256_bytes(text.as_bytes())[..12])
 }
 
 /// Writes the rows of episodes again, with the columns that name task, split and outcome.
-pub(super) fn write_meta(root: &Path, to: &Path, episodes: &[(i64, i64)]) -> Result<(), EditError> {
+pub(super) fn write_meta(root: &Path, to: &Path, tasks: &[String], episodes: &[(i64, i64)]) -> Result<(), EditError> {
+    let id = |task: i64| Some(task_id(tasks.get(usize::try_from(task).ok()?)?));
     let files = (layout::META_EPISODES, META_EPISODES.name());
     let mut left = episodes.iter();
     copy_files(root, to, files, &WriteOptions::default(), |rows| {
         let of_rows: Vec<(i64, i64)> = left.by_ref().take(rows.num_rows()).copied().collect();
         check_lengths(root, &rows, &of_rows)?;
-        let ids: StringArray = of_rows.iter().map(|(_, task)| Some(task_id(*task))).collect();
+        let ids: StringArray = of_rows.iter().map(|(_, task)| Some(id(*task).unwrap_or_default())).collect();
         let n_rows = of_rows.len();
         let columns: Vec<(Field, ArrayRef)> = vec![
             (Field::new("ntp/task_id", DataType::Utf8, false), Arc::new(ids)),

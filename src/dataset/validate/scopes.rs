@@ -12,7 +12,7 @@ use crate::dataset::cursor::{Batch, Cursor, Rows};
 use crate::dataset::episode_rows::EpisodeRow;
 use crate::dataset::finding::Validation;
 use crate::table::{Columns, TableError};
-use crate::trace::{ProgramCall, Span};
+use crate::trace::Span;
 
 /// Every column of `ntp/scopes/`.
 pub(super) struct ScopeBatch {
@@ -40,24 +40,33 @@ impl Batch for ScopeBatch {
     }
 }
 
+/// A call that has labels.
+pub(super) struct Labelled {
+    pub(super) call: u32,
+    /// The frames that are labelled.
+    pub(super) input: Span,
+    /// Those inside.
+    pub(super) output: Span,
+}
+
 /// Checks the labels of an episode.
 pub(super) fn check(
     cursor: &mut Cursor<ScopeBatch>,
     row: &EpisodeRow,
-    calls: &[ProgramCall],
+    calls: impl IntoIterator<Item = Labelled>,
     validation: &mut Validation,
 ) -> Result<(), DatasetError> {
     let mut n_scopes = 0;
-    for (call, output) in calls.iter().filter_map(|call| Some((call, call.output?))) {
-        let mut begin = call.input.begin;
-        while begin < call.input.end {
-            let rows = cursor.next_rows(row.scopes, (call.input.end - begin) as usize)?;
+    for Labelled { call, input, output } in calls {
+        let mut begin = input.begin;
+        while begin < input.end {
+            let rows = cursor.next_rows(row.scopes, (input.end - begin) as usize)?;
             let end = begin + rows.range.len() as u32;
-            let run = Run { episode: row.episode_index, call: i64::from(call.id.0), frames: begin..end, output };
+            let run = Run { episode: row.episode_index, call: i64::from(call), frames: begin..end, output };
             run.check(&rows, validation)?;
             begin = end;
         }
-        n_scopes += call.input.len() as i64;
+        n_scopes += input.len() as i64;
     }
     validation.scopes += n_scopes as u64;
     if row.n_scopes != n_scopes {

@@ -1,9 +1,12 @@
 //! What is written of a dataset at its end: the last rows, texts, totals and statistics.
 
-use crate::artifact::write_json;
+use serde_json::json;
+
+use crate::artifact::{IoError, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::target::{EditSummary, Target};
 use crate::dataset::feature::FEATURES;
+use crate::dataset::import::vocabulary;
 use crate::dataset::info::{FeatureInfo, Features, Info, NtpInfo, Stats, declared};
 use crate::dataset::layout;
 use crate::dataset::text_files::{write_subtasks, write_tasks};
@@ -17,7 +20,7 @@ impl Target {
         write_tasks(&self.root, self.tasks.texts())?;
         write_subtasks(&self.root, self.subtasks.texts())?;
         let slots = self.slots.take().unwrap_or_default();
-        write_json(&self.root.join(layout::INFO), &self.info(&slots))?;
+        self.write_info(&slots)?;
         write_json(&self.root.join(layout::NTP_INFO), &self.ntp_info(slots, failed_left_out))?;
         let Self { root, tasks, statistics, pictures, mut summary, .. } = self;
         let single = [layout::INFO, layout::STATS, layout::TASKS, layout::SUBTASKS, layout::NTP_INFO, layout::EPISODES];
@@ -32,6 +35,17 @@ impl Target {
         summary.tasks = tasks.texts().len() as u64;
         summary.files = files;
         Ok(summary)
+    }
+
+    /// Writes what is declared; of an imported dataset all that others have declared, with totals of its own.
+    fn write_info(&self, slots: &[String]) -> Result<(), IoError> {
+        let (path, own) = (self.root.join(layout::INFO), self.info(slots));
+        let Some(mut theirs) = self.theirs.clone() else { return write_json(&path, &own) };
+        theirs["total_episodes"] = json!(own.total_episodes);
+        theirs["total_frames"] = json!(own.total_frames);
+        theirs["total_tasks"] = json!(own.total_tasks);
+        theirs["splits"] = json!(own.splits);
+        write_json(&path, &theirs)
     }
 
     fn info(&self, slots: &[String]) -> Info {
@@ -55,7 +69,13 @@ impl Target {
     }
 
     fn ntp_info(&self, slots: Vec<String>, failed_left_out: u64) -> NtpInfo {
+        let (vocabulary, vocabulary_hash) = match &self.ntp.annotated_by {
+            Some(_) => vocabulary(self.subtasks.texts()),
+            None => (self.ntp.vocabulary.clone(), self.ntp.vocabulary_hash.clone()),
+        };
         NtpInfo {
+            vocabulary,
+            vocabulary_hash,
             ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
             families: self.families.iter().map(|family| family.name().to_owned()).collect(),
             slots,
