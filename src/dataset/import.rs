@@ -20,6 +20,7 @@ mod frames;
 mod rows;
 mod texts;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
@@ -103,9 +104,11 @@ fn read_info(root: &Path) -> Result<Value, EditError> {
     Ok(info)
 }
 
-/// The programs of annotated episodes, with the hash that names them.
+/// The programs of annotated episodes, in an order that does not depend on that of the episodes, with the hash that
+/// names them.
 pub(crate) fn vocabulary(subtasks: &[String]) -> (Vec<String>, String) {
-    let programs: Vec<String> = std::iter::once(ROOT.to_owned()).chain(subtasks.iter().cloned()).collect();
+    let texts: BTreeSet<&String> = subtasks.iter().collect();
+    let programs: Vec<String> = std::iter::once(ROOT.to_owned()).chain(texts.into_iter().cloned()).collect();
     let hash = sha256_bytes(programs.join("\n").as_bytes())[..16].to_owned();
     (programs, hash)
 }

@@ -208,7 +208,8 @@ fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Re
     // Its recording is the data that was imported: of that each frame is there.
     read_frame(root, found, frame, |batch: &AnnotatedBatch, at| FrameFacts {
         recording_frame: frame,
-        time_secs: f64::from(batch.timestamp[at]),
+        // To the microsecond, which is more than its four bytes tell.
+        time_secs: (f64::from(batch.timestamp[at]) * 1e6).round() / 1e6,
         is_boundary: calls.iter().any(|call| call.frames.map(i64::from).contains(&frame)),
         ..batch.running.facts(at, frame, calls)
     })

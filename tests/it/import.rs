@@ -209,14 +209,7 @@ fn an_imported_dataset_is_split_and_merged_to_what_it_was() {
         LeRobotDatasetV3::load_from_directory(dataset).unwrap();
     }
     let difference = diff(&whole, &merged).unwrap();
-    assert_eq!((difference.same, difference.changed), (6, 0));
-    let vocabulary = |root: &Path| {
-        let info: Value = read_json(&root.join("ntp/info.json")).unwrap();
-        let mut programs: Vec<String> = serde_json::from_value(info["vocabulary"].clone()).unwrap();
-        programs.sort();
-        programs
-    };
-    assert_eq!(vocabulary(&merged), vocabulary(&whole));
+    assert!(difference.same == 6 && difference.is_none(), "{difference:?}");
     let filtered = folder.path().join("filtered");
     let condition = Condition { programs: vec!["block_stacking".to_owned()], ..Condition::default() };
     assert!(filter(&whole, &condition, &filtered).unwrap().episodes > 0);
@@ -262,6 +255,7 @@ fn a_frame_of_an_imported_dataset_leads_to_the_file_that_it_was_read_from() {
     let stack: Vec<_> = frame.stack.iter().map(|call| (call.program.as_str(), call.frames)).collect();
     assert_eq!(stack, [("task", [0, 5]), ("pick_and_place block_D block_B", [0, 4])]);
     assert_eq!((frame.frame_index, frame.recording_frame, frame.is_boundary), (1, 1, false));
+    assert_eq!(frame.time_secs, 0.1);
     assert!(explain_episode(&whole, 2, Some(4), &[]).unwrap().frame.unwrap().is_boundary);
     assert_eq!((found.recording.file.as_str(), found.recording.path), (DATA, Some(source.join(DATA))));
     assert_eq!(found.episode.recording_sha256, sha256_file(&source.join(DATA)).unwrap());
