@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use burn::backend::Flex;
 use burn::backend::flex::FlexTensor;
-use burn::backend::ops::FloatTensorOps;
+use burn::backend::ops::FloatTensorOps as _;
 use burn::tensor::TensorData;
 use rayon::prelude::*;
 
