@@ -6,6 +6,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const N_FEATURES: usize = 7;
 /// Directions of features that vary less than this, of the most that any does, tell nothing.
 const LEAST_VARIANCE: f64 = 1e-7;
+/// A thing whose squared distance from its mean place is less than this on average, in square metres, stands aside: any
+/// colour tells its place, so it takes one of those that are left.
+const STILL: f64 = 1e-6;
 
 /// Looks at pictures (`[F, K, width]`: x, y and mass first) beside positions (`[F, row]`: three a slot), and chooses for
 /// each of `n_slots` slots one of the colours behind the first, which is the robot's; each colour is chosen once at most.
@@ -20,6 +23,7 @@ pub(super) fn colours_of_slots(
     let row_width = rows.len() / n_pictures.max(1);
     let positions =
         DMatrix::from_fn(n_pictures, 3 * n_slots, |picture, column| f64::from(rows[picture * row_width + column]));
+    let variations = errors(&DMatrix::from_element(n_pictures, 1, 1.0), &positions);
     let mut residuals: Vec<(f64, usize, usize)> = Vec::new();
     for colour in 1..n_colours {
         let features = DMatrix::from_fn(n_pictures, N_FEATURES, |picture, feature| {
@@ -31,10 +35,17 @@ pub(super) fn colours_of_slots(
             }
         });
         let errors = errors(&features, &positions);
-        let of_slot = |slot: usize| errors[3 * slot..3 * slot + 3].iter().sum::<f64>();
-        residuals.extend((0..n_slots).map(|slot| (of_slot(slot), slot, colour)));
+        let left = |slot: usize| match sum_of_slot(&variations, slot) {
+            variation if variation > STILL * n_pictures as f64 => sum_of_slot(&errors, slot) / variation,
+            _ => f64::INFINITY,
+        };
+        residuals.extend((0..n_slots).map(|slot| (left(slot), slot, colour)));
     }
     chosen(residuals, n_slots)
+}
+
+fn sum_of_slot(columns: &[f64], slot: usize) -> f64 {
+    columns[3 * slot..3 * slot + 3].iter().sum()
 }
 
 /// The squared errors that are left of each column after linear regression on the features.
@@ -66,7 +77,7 @@ mod tests {
     use super::colours_of_slots;
 
     #[test]
-    fn each_slot_gets_the_colour_that_moves_with_it() {
+    fn each_slot_gets_the_colour_that_moves_with_it_and_one_that_stands_aside_what_is_left() {
         let n_pictures = 60;
         let wave = |picture: usize, of: usize| ((picture * (of + 3) * 7 + of * 5) as f32).sin();
         let mut looks = Vec::new();
@@ -74,12 +85,14 @@ mod tests {
         for picture in 0..n_pictures {
             let places: Vec<[f32; 2]> = (0..4).map(|of| [wave(picture, of), wave(picture, of + 10)]).collect();
             looks.extend(places.iter().flat_map(|&[x, y]| [x, y, 0.5]));
-            // The first slot is the third colour, the second the second; both are told from the robot.
+            // The first slot stands aside.
+            rows.extend([0.5, 0.25, 0.125]);
+            // The second is the third colour, the third the first; both are told from the robot.
             for colour in [3, 1] {
                 let [x, y] = [0, 1].map(|axis| places[colour][axis] - places[0][axis]);
                 rows.extend([0.3 * x, -0.2 * y, 0.1 * y]);
             }
         }
-        assert_eq!(colours_of_slots(&looks, [4, 3], &rows, 2), [3, 1]);
+        assert_eq!(colours_of_slots(&looks, [4, 3], &rows, 3), [2, 3, 1]);
     }
 }
