@@ -6,11 +6,11 @@
 //! Neural Programmer-Interpreter an LSTM. A cell's state belongs to a program call.
 
 use burn::module::{Module, ModuleDisplay};
-use burn::nn::Linear;
 use burn::tensor::activation::{sigmoid, tanh};
 use burn::tensor::{Device, Tensor};
 
 use crate::model::layers::{Init, Mlp};
+use crate::model::linear::Linear;
 
 /// What decides, from specification, program and state.
 pub trait Core: Module + ModuleDisplay + Sync + 'static {
@@ -162,7 +162,7 @@ impl Cell for Gru {
     }
 
     fn nothing(&self, n_calls: usize, device: &Device) -> Tensor<2> {
-        Tensor::zeros([n_calls, self.recurrent.weight.dims()[0]], device)
+        Tensor::zeros([n_calls, self.recurrent.n_inputs()], device)
     }
 
     fn first(recall: Tensor<2>, n_calls: usize) -> Tensor<2> {
@@ -218,7 +218,7 @@ impl Cell for Lstm {
     }
 
     fn nothing(&self, n_calls: usize, device: &Device) -> Self::Recall {
-        let zeros = Tensor::zeros([n_calls, self.recurrent.weight.dims()[0]], device);
+        let zeros = Tensor::zeros([n_calls, self.recurrent.n_inputs()], device);
         [zeros.clone(), zeros]
     }
 

@@ -6,12 +6,12 @@
 //! reason stands beside it. The argument decoder has an encoder of its own: with a shared one its loss stays at chance.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
+use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
 use crate::model::vectors::{Positions, Vectors};
 use crate::model::windows::{Padding, Windows};

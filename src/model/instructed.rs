@@ -14,7 +14,6 @@
 //! the words mean is not given; it is learned from the program losses.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::activation::{relu, softmax};
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
@@ -22,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
@@ -181,7 +181,7 @@ impl Encoder for Instructed {
     }
 
     fn device(&self) -> Device {
-        self.sentence.weight.device()
+        self.sentence.device()
     }
 }
 

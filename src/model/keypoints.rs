@@ -20,7 +20,6 @@
 mod naming;
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::activation::{relu, sigmoid, softmax};
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
@@ -28,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::convolution::Convolution;
 pub use crate::model::keypoints::naming::GlimpseNaming;
 use crate::model::layers::Init;
+use crate::model::linear::Linear;
 use crate::model::perception::{Looks, Perception};
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::seed::Seed;
@@ -110,7 +110,7 @@ impl Keypoints {
         let seen = self
             .shrinking
             .iter()
-            .fold(pictures.to_contrast_tensor(&self.scores.weight.device()), |seen, layer| relu(layer.forward(seen)));
+            .fold(pictures.to_contrast_tensor(&self.scores.device()), |seen, layer| relu(layer.forward(seen)));
         self.widening.iter().fold(seen, |seen, layer| relu(seen.clone() + layer.forward(seen)))
     }
 }

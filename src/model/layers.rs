@@ -5,13 +5,13 @@
 //! The last dimension of every tensor holds features; `[B, T, ...]` is batch and frame.
 
 use burn::module::{Module, Param, ParamId};
-use burn::nn::Linear;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::model::convolution::Convolution;
+use crate::model::linear::Linear;
 use crate::seed::Seed;
 
 /// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
@@ -49,20 +49,22 @@ impl Init {
     pub(crate) fn linear(&mut self, n_inputs: usize, n_outputs: usize) -> Linear {
         let bound = (n_inputs as f32).sqrt().recip();
         let weight = self.parameter([n_inputs, n_outputs], bound);
-        Linear { weight, bias: Some(self.parameter([n_outputs], bound)) }
+        let bias = self.parameter([n_outputs], bound);
+        Linear::new(weight, Some(bias))
     }
 
     /// A layer whose weights are uniform within `bound`.
     pub(crate) fn linear_within(&mut self, n_inputs: usize, n_outputs: usize, bound: f32) -> Linear {
         let weight = self.parameter([n_inputs, n_outputs], bound);
-        Linear { weight, bias: Some(self.filled([n_outputs], 0.0)) }
+        let bias = self.filled([n_outputs], 0.0);
+        Linear::new(weight, Some(bias))
     }
 
     /// A part of a layer that reads a concatenation of `n_concatenated` features, `n_inputs` of them here. The parts'
     /// outputs are added, which spares the concatenation and lets each part be computed where it is small.
     pub(crate) fn part(&mut self, n_inputs: usize, n_outputs: usize, n_concatenated: usize) -> Linear {
         let bound = (n_concatenated as f32).sqrt().recip();
-        Linear { weight: self.parameter([n_inputs, n_outputs], bound), bias: None }
+        Linear::new(self.parameter([n_inputs, n_outputs], bound), None)
     }
 
     pub(crate) fn mlp(&mut self, widths: &[usize]) -> Mlp {
@@ -116,7 +118,7 @@ pub(crate) struct TemporalConv {
 
 impl TemporalConv {
     pub(crate) fn device(&self) -> Device {
-        self.linear.weight.device()
+        self.linear.device()
     }
 
     /// # Shapes

@@ -6,10 +6,10 @@
 //! [`Program::None`] besides, which the paper has not: a program can end without a last call.
 
 use burn::module::{Module, Param};
-use burn::nn::Linear;
 use burn::tensor::Tensor;
 
 use crate::model::layers::Init;
+use crate::model::linear::Linear;
 use crate::model::network::CoreOutput;
 use crate::program::Program;
 

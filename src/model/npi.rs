@@ -15,12 +15,12 @@ pub use by_slot::{BySlot, SlotReading};
 pub use by_vector::ByVector;
 
 use burn::module::{Module, ModuleDisplay, Param};
-use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::core_network::{Core, LstmCore};
 use crate::model::decisions::Decisions;
 use crate::model::layers::{Init, repeat_row};
+use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CoreOutput, Given, Network};
 use crate::model::pictures::Pictures;

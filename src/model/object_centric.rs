@@ -17,7 +17,6 @@
 //! Ours, beyond the paper, whose encoder is [`super::flattened`]; interpreter, core and memory are the paper's.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
@@ -25,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
@@ -194,7 +194,7 @@ impl Encoder for ObjectCentric {
     }
 
     fn device(&self) -> Device {
-        self.pair.weight.device()
+        self.pair.device()
     }
 }
 

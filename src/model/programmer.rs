@@ -6,13 +6,13 @@
 //! Paper, section IV, and its baselines in section V.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 
 use crate::model::core_network::{Core, GruCore, Reactive};
 use crate::model::decisions::Decisions;
 use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
 use crate::model::layers::{Init, repeat_row};
+use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CoreOutput, Given, Network};
 use crate::model::pictures::{PictureSample, Pictures};

@@ -5,12 +5,12 @@
 //! Paper, section IV: scoping labels from `h_j = [p; y_j; s]`. "NTP (no scope)" and the flat models have none.
 
 use burn::module::{Module, ModuleDisplay};
-use burn::nn::Linear;
 use burn::tensor::Tensor;
 use burn::tensor::activation::relu;
 
 use crate::model::decisions::Decisions;
 use crate::model::layers::Init;
+use crate::model::linear::Linear;
 use crate::trace::ScopingLabel;
 
 /// How a variant treats windows.

@@ -18,13 +18,13 @@
 //! that names the argument learns it.
 
 use burn::module::{Module, ModuleDisplay};
-use burn::nn::Linear;
 use burn::tensor::activation::{leaky_relu, relu};
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::linear::Linear;
 use crate::model::perception::{Looks as _, PERCEPT_WIDTH, Perception};
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::summary::summarize;
@@ -284,7 +284,7 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
     }
 
     fn device(&self) -> Device {
-        self.pair.weight.device()
+        self.pair.device()
     }
 }
 

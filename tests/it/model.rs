@@ -1,12 +1,11 @@
 //! Networks, decoders, model folders and the learned policy.
 
-use burn::nn::Linear;
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
     CONFIG_FILE, Cell as _, Decisions, Decoder, Flattened, FlattenedConfig, Given, Gru, Instructed, InstructedConfig,
-    LabelScores, Lstm, ModelConfig, ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric, ObjectCentricConfig,
-    Pictures, ProgramMemory, ScopeHead, Sentences, Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score,
-    weights_to_bytes, with_network,
+    LabelScores, Linear, Lstm, ModelConfig, ModelError, Network, NetworkUse, Ntp, NtpGru, ObjectCentric,
+    ObjectCentricConfig, Pictures, ProgramMemory, ScopeHead, Sentences, Variant, WEIGHTS_FILE, Windows, check_purpose,
+    inspect, span_score, weights_to_bytes, with_network,
 };
 use ntp::program::Program;
 use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
@@ -275,10 +274,8 @@ fn npi_is_told_by_arguments_and_by_the_names_of_tasks_that_it_knows() {
 }
 
 fn linear(weight: Tensor<2>, bias: Option<Vec<f32>>) -> Linear {
-    Linear {
-        weight: burn::module::Param::from_tensor(weight),
-        bias: bias.map(|bias| burn::module::Param::from_data(bias.as_slice(), &device())),
-    }
+    let bias = bias.map(|bias| burn::module::Param::from_data(bias.as_slice(), &device()));
+    Linear::new(burn::module::Param::from_tensor(weight), bias)
 }
 
 /// x = 1, h = 0.5, W = (1, -1, 2) with bias (0, 0, 0.5), U = (2, 0, 3):

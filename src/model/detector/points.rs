@@ -16,7 +16,6 @@
 //! Ours, beyond the paper.
 
 use burn::module::{Module, Param};
-use burn::nn::Linear;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
@@ -26,6 +25,7 @@ use crate::model::detector::Detector;
 use crate::model::detector::assignment::colours_of_slots;
 use crate::model::detector::patches::{CHANNELS, Claimed};
 use crate::model::layers::{Init, Mlp};
+use crate::model::linear::Linear;
 use crate::model::perception::Perception as _;
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::seed::Seed;
@@ -98,7 +98,7 @@ struct Looks {
 
 impl PointDetector {
     fn look(&self, pictures: &Pictures) -> Looks {
-        let device = self.place.weight.device();
+        let device = self.place.device();
         let claims = self.perception.claims(pictures);
         let claimed = Claimed { pictures, claims: &claims, n_things: self.n_slots };
         let mut finder = Finder::new(pictures.width, pictures.height);
@@ -182,6 +182,6 @@ impl Detector for PointDetector {
     }
 
     fn device(&self) -> Device {
-        self.place.weight.device()
+        self.place.device()
     }
 }

@@ -6,7 +6,6 @@
 //! parameter, since a CPU has no week for the full one.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::nn::pool::MaxPool2dConfig;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
@@ -15,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::convolution::Convolution;
 use crate::model::detector::Detector;
 use crate::model::layers::{Init, Mlp};
+use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
 
 /// Channels of each block's convolutions at full width, and how many there are.
@@ -73,7 +73,7 @@ impl Detector for VggDetector {
     }
 
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let pixels = pictures.to_tensor(&self.positions.weight.device());
+        let pixels = pictures.to_tensor(&self.positions.device());
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
         let seen = self.blocks.iter().fold(pixels, |seen, block| {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
@@ -83,6 +83,6 @@ impl Detector for VggDetector {
     }
 
     fn device(&self) -> Device {
-        self.positions.weight.device()
+        self.positions.device()
     }
 }

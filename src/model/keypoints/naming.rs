@@ -1,13 +1,13 @@
 //! Names an object by what is seen where the robot comes to be, and by how each keypoint lies and moves.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::activation::{relu, softmax};
 use burn::tensor::{Tensor, TensorData};
 
 use crate::model::encoder::ArgumentDecoder;
 use crate::model::keypoints::{CellLooks, Keypoints, KeypointsConfig};
 use crate::model::layers::{Init, TemporalConv};
+use crate::model::linear::Linear;
 use crate::model::sighted::{Sighted, SightedConfig, SightedReading};
 use crate::model::windows::Padding;
 

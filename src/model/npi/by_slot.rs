@@ -1,13 +1,13 @@
 //! State and arguments slot by slot.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::decisions::MAX_ARGUMENTS;
 use crate::model::features::{OBJECT_WIDTH, POSITION_WIDTH, Rows};
 use crate::model::layers::Init;
+use crate::model::linear::Linear;
 use crate::model::network::Given;
 use crate::model::npi::{CallEncoder, flags};
 use crate::model::object_centric::ObjectCentricConfig;
@@ -80,12 +80,12 @@ impl CallEncoder for BySlot {
     }
 
     fn device(&self) -> Device {
-        self.pair.weight.device()
+        self.pair.device()
     }
 }
 
 impl BySlot {
     fn n_slots(&self) -> usize {
-        self.slot_context.weight.dims()[1] / self.slot_object.weight.dims()[1]
+        self.slot_context.n_outputs() / self.slot_object.n_outputs()
     }
 }

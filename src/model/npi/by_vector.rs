@@ -1,13 +1,13 @@
 //! State and arguments as one vector.
 
 use burn::module::Module;
-use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::decisions::MAX_ARGUMENTS;
 use crate::model::features::{Rows, flat_width};
 use crate::model::flattened::FlattenedConfig;
 use crate::model::layers::{Init, Mlp};
+use crate::model::linear::Linear;
 use crate::model::network::Given;
 use crate::model::npi::{CallEncoder, flags};
 
@@ -56,12 +56,12 @@ impl CallEncoder for ByVector {
     }
 
     fn device(&self) -> Device {
-        self.slots.weight.device()
+        self.slots.device()
     }
 }
 
 impl ByVector {
     fn n_slots(&self) -> usize {
-        self.slots.weight.dims()[1] / MAX_ARGUMENTS
+        self.slots.n_outputs() / MAX_ARGUMENTS
     }
 }
