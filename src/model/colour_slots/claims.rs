@@ -86,9 +86,10 @@ impl Claims {
 
 fn brightness(pictures: &Pictures, background: &[f32]) -> Vec<f32> {
     let usual: Vec<f32> = background.as_chunks::<3>().0.iter().map(|rgb| rgb.iter().sum()).collect();
-    let of_picture = |picture: &[u8]| {
+    let mut brightness = Vec::with_capacity(pictures.n * usual.len());
+    for picture in pictures.iter() {
         let sums = picture.as_chunks::<3>().0.iter().map(|rgb| rgb.iter().map(|&value| f32::from(value)).sum::<f32>());
-        sums.zip(&usual).map(|(sum, usual)| (sum - usual) / 765.0).collect::<Vec<f32>>()
-    };
-    pictures.iter().flat_map(of_picture).collect()
+        brightness.extend(sums.zip(&usual).map(|(sum, usual)| (sum - usual) / 765.0));
+    }
+    brightness
 }

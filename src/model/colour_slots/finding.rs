@@ -25,13 +25,15 @@ pub(crate) struct Finder {
     height: usize,
     /// Of one slot in one picture: `[height, width]`.
     shares: Vec<f32>,
-    /// Sums of shares above and to the left: `[height + 1, width + 1]`.
-    sums: Vec<f32>,
+    /// Sums of the shares above: `[height + 1, width]`.
+    above: Vec<f32>,
+    neighbours: Neighbours,
 }
 
 impl Finder {
     pub(crate) fn new(width: usize, height: usize) -> Self {
-        Self { width, height, shares: vec![0.0; width * height], sums: vec![0.0; (width + 1) * (height + 1)] }
+        let (shares, above) = (vec![0.0; width * height], vec![0.0; width * (height + 1)]);
+        Self { width, height, shares, above, neighbours: Neighbours::default() }
     }
 
     /// A slot's thing in a picture, looked for with a square window of `side` pixels.
@@ -46,29 +48,29 @@ impl Finder {
     }
 
     fn sum_up(&mut self) {
-        let stride = self.width + 1;
         for row in 0..self.height {
-            let mut of_row = 0.0;
-            for column in 0..self.width {
-                of_row += self.shares[row * self.width + column];
-                self.sums[(row + 1) * stride + column + 1] = self.sums[row * stride + column + 1] + of_row;
+            let (before, after) = self.above.split_at_mut((row + 1) * self.width);
+            let before = &before[row * self.width..];
+            let shares = &self.shares[row * self.width..][..self.width];
+            for ((sum, above), share) in after.iter_mut().zip(before).zip(shares) {
+                *sum = above + share;
             }
         }
     }
 
-    fn sum(&self, [left, top]: [usize; 2], [right, bottom]: [usize; 2]) -> f32 {
-        let stride = self.width + 1;
-        let at = |column: usize, row: usize| self.sums[row * stride + column];
-        at(right, bottom) - at(left, bottom) - at(right, top) + at(left, top)
-    }
-
     /// The upper left corner of the window with the most in it; of equals the first.
-    fn densest(&self, side: usize) -> [usize; 2] {
+    fn densest(&mut self, side: usize) -> [usize; 2] {
         let (across, down) = (side.min(self.width), side.min(self.height));
         let mut best = (f32::NEG_INFINITY, [0, 0]);
         for row in 0..=self.height - down {
-            for column in 0..=self.width - across {
-                let sum = self.sum([column, row], [column + across, row + down]);
+            let above = &self.above[row * self.width..][..self.width];
+            let until = &self.above[(row + down) * self.width..][..self.width];
+            let columns = until.iter().zip(above).map(|(until, above)| until - above);
+            let sums = self.neighbours.sums(columns, across);
+            if most(sums) <= best.0 + 1e-4 {
+                continue;
+            }
+            for (column, &sum) in sums.iter().enumerate() {
                 if sum > best.0 + 1e-4 {
                     best = (sum, [column, row]);
                 }
@@ -90,7 +92,7 @@ impl Finder {
         let corner = first.centre.map(|middle| (middle - side as f32 / 2.0).round() as i64);
         let (columns, rows) = window(corner[0], corner[1]);
         let found = self.moments(columns, rows);
-        let all = self.sum([0, 0], [self.width, self.height]);
+        let all: f32 = self.above[self.height * self.width..].iter().sum();
         Find { elsewhere: (all - found.mass).max(0.0), ..found }
     }
 
@@ -119,9 +121,51 @@ impl Finder {
     }
 }
 
+/// The greatest of some numbers, eight at a time.
+fn most(numbers: &[f32]) -> f32 {
+    let (eights, rest) = numbers.as_chunks::<8>();
+    let greater = |one: f32, other: f32| if one > other { one } else { other };
+    let of_eights = eights
+        .iter()
+        .fold([f32::NEG_INFINITY; 8], |most, eight| std::array::from_fn(|lane| greater(eight[lane], most[lane])));
+    of_eights.iter().chain(rest).copied().fold(f32::NEG_INFINITY, greater)
+}
+
+/// Sums of neighbours in a line. Those of twice as many follow from those of half as many, all along the line at once.
+#[derive(Default)]
+struct Neighbours {
+    /// Sums of a power of two neighbours.
+    spans: Vec<f32>,
+    doubled: Vec<f32>,
+    sums: Vec<f32>,
+}
+
+impl Neighbours {
+    /// The sum of each `n` values that follow one another in `line`.
+    fn sums(&mut self, line: impl Iterator<Item = f32>, n: usize) -> &[f32] {
+        self.spans.clear();
+        self.spans.extend(line);
+        self.sums.clear();
+        self.sums.resize((self.spans.len() + 1).saturating_sub(n), 0.0);
+        let (mut span, mut n_summed) = (1, 0);
+        while n_summed < n {
+            if n & span != 0 {
+                let further = self.spans.iter().skip(n_summed);
+                self.sums.iter_mut().zip(further).for_each(|(sum, further)| *sum += further);
+                n_summed += span;
+            }
+            self.doubled.clear();
+            self.doubled.extend(self.spans.iter().zip(self.spans.iter().skip(span)).map(|(left, right)| left + right));
+            std::mem::swap(&mut self.spans, &mut self.doubled);
+            span *= 2;
+        }
+        &self.sums
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Finder;
+    use super::{Finder, Neighbours};
     use crate::model::colour_slots::Claims;
 
     #[test]
@@ -136,5 +180,15 @@ mod tests {
         assert_eq!(find.spread, [0.5, 0.5]);
         let nothing = finder.find(&claims, 0, 1, 4);
         assert_eq!((nothing.mass, nothing.elsewhere), (0.0, 0.0));
+    }
+
+    #[test]
+    fn neighbours_are_summed_as_one_by_one() {
+        let line = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+        for n in 1..=line.len() {
+            let sums: Vec<f32> = line.windows(n).map(|window| window.iter().sum()).collect();
+            assert_eq!(Neighbours::default().sums(line.into_iter(), n), sums, "{n}");
+        }
+        assert_eq!(Neighbours::default().sums(line.into_iter(), 8), [0.0; 0]);
     }
 }
