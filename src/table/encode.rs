@@ -6,8 +6,11 @@ use parquet::file::writer::SerializedColumnWriter;
 
 use crate::table::values::Values;
 
-/// Texts that are handed to the column writer at a time.
+/// Texts that are handed to the column writer at a time; between them it sees whether its page is full.
 const TEXT_BATCH: usize = 1024;
+
+/// Pictures that are handed to it at a time: a few fill a page, and whoever wants one reads the whole page.
+const PICTURE_BATCH: usize = 1;
 
 /// Levels of the column being written; used again for the next one.
 #[derive(Default)]
@@ -56,7 +59,9 @@ impl Encoder {
                 self.repetition.extend(rows.iter().flat_map(|_| [0, 1, 1]));
                 self.with_levels::<DoubleType>(column, rows.as_flattened())
             }
-            Values::Pictures(rows) => self.optional_texts(column, rows.iter().map(|row| Some(row.clone().into()))),
+            Values::Pictures(rows) => {
+                self.optional_bytes(column, rows.iter().map(|row| Some(row.clone().into())), PICTURE_BATCH)
+            }
         }
     }
 
@@ -78,12 +83,21 @@ impl Encoder {
         column: &mut SerializedColumnWriter<'_>,
         rows: impl ExactSizeIterator<Item = Option<ByteArray>>,
     ) -> Result<()> {
+        self.optional_bytes(column, rows, TEXT_BATCH)
+    }
+
+    fn optional_bytes(
+        &mut self,
+        column: &mut SerializedColumnWriter<'_>,
+        rows: impl ExactSizeIterator<Item = Option<ByteArray>>,
+        batch: usize,
+    ) -> Result<()> {
         let mut rows = rows.peekable();
-        let mut values = Vec::with_capacity(TEXT_BATCH);
+        let mut values = Vec::with_capacity(batch);
         while rows.peek().is_some() {
             values.clear();
             self.definition.clear();
-            for row in rows.by_ref().take(TEXT_BATCH) {
+            for row in rows.by_ref().take(batch) {
                 self.definition.push(i16::from(row.is_some()));
                 values.extend(row);
             }

@@ -10,6 +10,8 @@ use ntp::seed::Seed;
 use ntp::task::Split;
 use ntp::trace::Episode;
 use ntp::video::{Mp4Reader, Rgb};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::file::metadata::PageIndexPolicy;
 use re_lerobot::EpisodeIndex;
 use re_lerobot::datasetv3::LeRobotDatasetV3;
 
@@ -132,6 +134,23 @@ fn reruns_reader_opens_images_and_videos() {
         let video = opened.read_episode_video_contents("observation.images.wrist", EpisodeIndex(position)).unwrap();
         assert_eq!(&video[4..8], b"ftyp");
     }
+}
+
+/// Whoever wants the pictures of one episode reads whole pages.
+#[test]
+fn a_page_ends_with_the_picture_that_fills_it() {
+    let made = made(FrameChoice::All);
+    let file = std::fs::File::open(made.root.join("data/chunk-000/file-000.parquet")).unwrap();
+    let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Required);
+    let footer = ArrowReaderMetadata::load(&file, options).unwrap();
+    let columns = footer.metadata().file_metadata().schema_descr().columns().iter();
+    let column = columns.clone().position(|leaf| leaf.path().parts() == ["observation.images.front", "bytes"]).unwrap();
+    let groups = footer.metadata().offset_index().unwrap();
+    let pages: Vec<i32> =
+        groups.iter().flat_map(|group| group[column].page_locations()).map(|page| page.compressed_page_size).collect();
+    let largest_picture = 3 * 64 * 48;
+    assert!(pages.len() > 1, "{pages:?}");
+    assert!(pages.iter().all(|&bytes| bytes < (1 << 16) + largest_picture), "{pages:?}");
 }
 
 #[test]
