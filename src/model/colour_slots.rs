@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::clusters::{centres, most_mobile};
 use crate::model::colour_slots::foreground::{COLOUR_WIDTH, Foreground, background, foreground};
-use crate::model::layers::Init;
+use crate::model::layers::{Init, replaced};
 use crate::model::perception::Perception;
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::sighted::PerceptNaming;
@@ -164,11 +164,4 @@ impl Perception for ColourSlots {
         let masses = scores.exp().sum_dim(1) / full;
         (Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2), ())
     }
-}
-
-/// The same parameter with another value.
-fn replaced<const D: usize>(before: &Param<Tensor<D>>, value: TensorData, device: &Device) -> Param<Tensor<D>> {
-    let mut parameter = Param::from_data(value, device);
-    parameter.id = before.id;
-    parameter
 }

@@ -161,3 +161,14 @@ pub(crate) fn with_most_before(frames: Tensor<3>) -> Tensor<3> {
 pub(crate) fn max_over_frames(frames: Tensor<3>) -> Tensor<2> {
     frames.max_dim(1).squeeze_dim(1)
 }
+
+/// The same parameter with another value.
+pub(crate) fn replaced<const D: usize>(
+    before: &Param<Tensor<D>>,
+    value: TensorData,
+    device: &Device,
+) -> Param<Tensor<D>> {
+    let mut parameter = Param::from_data(value, device);
+    parameter.id = before.id;
+    parameter
+}

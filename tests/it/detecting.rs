@@ -215,7 +215,8 @@ fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     let channels = [3, 4, 4, 8, 8, 16, 16, 16, 32, 32, 32, 32, 32, 32];
     let convolutions: usize = channels.windows(2).map(|pair| 9 * pair[0] * pair[1] + pair[1]).sum();
     let top = (2 * 2 * 32 * 256 + 256) + (256 * 256 + 256) + (256 * 24 + 24);
-    assert_eq!(network.num_params(), convolutions + top);
+    let mean_and_deviation = 64 * 64 * 3 + 1;
+    assert_eq!(network.num_params(), convolutions + top + mean_and_deviation);
     let folder = tempfile::tempdir().unwrap();
     let detector =
         DetectorTraining { steps: Some(200), pictures: Some(16), learning_rate: Some(0.002), narrowed: Some(16) };

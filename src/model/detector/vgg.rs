@@ -5,7 +5,7 @@
 //! Simonyan and Zisserman, "Very Deep Convolutional Networks", configuration D, which the paper names; the width is a
 //! parameter, since a CPU has no week for the full one.
 
-use burn::module::Module;
+use burn::module::{Module, Param};
 use burn::nn::pool::MaxPool2dConfig;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
@@ -13,14 +13,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::convolution::Convolution;
 use crate::model::detector::Detector;
-use crate::model::layers::{Init, Mlp};
+use crate::model::layers::{Init, Mlp, replaced};
 use crate::model::linear::Linear;
-use crate::model::pictures::Pictures;
+use crate::model::pictures::{PictureSample, Pictures};
+use crate::seed::Seed;
 
 /// Channels of each block's convolutions at full width, and how many there are.
 const BLOCKS: [(usize, usize); 5] = [(64, 2), (128, 2), (256, 3), (512, 3), (512, 3)];
 /// Features of each of the two layers above them at full width.
 const TOP: usize = 4096;
+
+/// Pictures that are all alike are not divided by nothing.
+const LEAST_DEVIATION: f32 = 1e-3;
 
 /// Sizes of the detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,6 +48,11 @@ impl VggDetectorConfig {
 /// VGG16's layers.
 #[derive(Module, Debug)]
 pub struct VggDetector {
+    /// `[pixels, pixels, 3]`: what the pictures mostly show; not learned but found. Without it what differs between two
+    /// pictures drowns in what does not.
+    mean: Param<Tensor<3>>,
+    /// `[1]`: the deviations from it.
+    deviation: Param<Tensor<1>>,
     blocks: Vec<Vec<Convolution>>,
     top: Mlp,
     positions: Linear,
@@ -66,14 +75,26 @@ impl Detector for VggDetector {
         }
         let top = TOP / narrowed;
         Self {
+            mean: init.filled([config.pixels, config.pixels, 3], 0.0).set_require_grad(false),
+            deviation: init.filled([1], 1.0).set_require_grad(false),
             blocks,
             top: init.mlp(&[channels * pixels * pixels, top, top]),
             positions: init.linear(top, 3 * n_slots),
         }
     }
 
+    fn acquainted(mut self, sample: &PictureSample, _positions: &[f32], _seed: Seed) -> Self {
+        let pixels = sample.pictures.to_tensor(&self.device());
+        let mean = pixels.clone().mean_dim(0);
+        let deviation = (pixels - mean.clone()).powf_scalar(2.0).mean().sqrt().clamp_min(LEAST_DEVIATION);
+        self.mean = replaced(&self.mean, mean.squeeze_dim::<3>(0).into_data(), &self.device()).set_require_grad(false);
+        self.deviation = replaced(&self.deviation, deviation.into_data(), &self.device()).set_require_grad(false);
+        self
+    }
+
     fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        let pixels = pictures.to_tensor(&self.positions.device());
+        let pixels = pictures.to_tensor(&self.device()) - self.mean.val().unsqueeze::<4>();
+        let pixels = pixels / self.deviation.val().unsqueeze::<4>();
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
         let seen = self.blocks.iter().fold(pixels, |seen, block| {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
