@@ -51,3 +51,23 @@ impl Linear {
         outputs.reshape(shape)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Linear;
+    use burn::module::Param;
+    use burn::tensor::{Device, Tensor};
+
+    #[test]
+    fn each_row_is_multiplied_wherever_it_stands() {
+        let device = Device::flex();
+        let weight = Tensor::<2>::from_data([[1.0_f32, 2.0, 0.0], [3.0, 4.0, 5.0]], &device);
+        let bias = Tensor::<1>::from_data([10.0_f32, 20.0, 30.0], &device);
+        let inputs = Tensor::<3>::from_data([[[1.0_f32, 0.0]], [[2.0, -1.0]]], &device);
+        let layer = Linear::new(Param::from_tensor(weight), Some(Param::from_tensor(bias)));
+        let outputs = layer.forward(inputs);
+        assert_eq!(outputs.dims(), [2, 1, 3]);
+        let values: Vec<f32> = outputs.into_data().try_into_vec().unwrap();
+        assert_eq!(values, [11.0, 22.0, 30.0, 9.0, 20.0, 25.0]);
+    }
+}
