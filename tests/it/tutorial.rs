@@ -34,8 +34,8 @@ fn every_command_of_the_tutorial_does_what_it_says_in_an_empty_directory() {
 #[test]
 fn the_readmes_tables_are_those_that_a_run_printed() {
     let text = |path: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
-    let (page, printed) = (text("README.md"), text("docs/results/paper_small.md"));
-    let (_, shown) = page.split_once("<!-- of docs/results/paper_small.md -->\n\n").unwrap();
+    let (page, printed) = (text("README.md"), text("docs/results/paper.md"));
+    let (_, shown) = page.split_once("<!-- of docs/results/paper.md -->\n\n").unwrap();
     let tables = |text: &str| text.split("\n\n").filter(|part| part.starts_with("| model ")).count();
     let shown: Vec<&str> = shown.split("\n\n").take(3).collect();
     assert_eq!(tables(&printed), shown.len());
