@@ -23,6 +23,8 @@ pub struct Progress {
 /// The state of plain lines.
 struct Plain {
     began: Instant,
+    /// What was done before it began.
+    before: u64,
     said: Instant,
     every: Duration,
     out: Box<dyn Write + Send>,
@@ -54,7 +56,7 @@ impl Progress {
     /// Progress told in lines: one at once, then at most one in `every`, one at the end.
     fn plain(name: &str, total: u64, what: &str, every: Duration, out: Box<dyn Write + Send>) -> Self {
         let began = now();
-        let mut plain = Plain { began, said: began, every, out };
+        let mut plain = Plain { began, before: 0, said: began, every, out };
         plain.say(&format!("{name}: {total} {what}"));
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
         Self { bar, name: name.to_owned(), what: what.to_owned(), plain: Some(Mutex::new(plain)) }
@@ -63,6 +65,15 @@ impl Progress {
     /// Progress that is not shown.
     pub fn hidden() -> Self {
         Self { bar: ProgressBar::hidden(), name: String::new(), what: String::new(), plain: None }
+    }
+
+    /// So much was done before; what is left takes its time from what follows.
+    pub fn carry_on_after(&self, done: u64) {
+        self.bar.set_position(done);
+        self.bar.reset_eta();
+        if let Some(Ok(mut plain)) = self.plain.as_ref().map(Mutex::lock) {
+            plain.before = done;
+        }
     }
 
     /// So many more are done.
@@ -100,7 +111,8 @@ impl Progress {
         }
         plain.said = now();
         let (done, total) = (self.bar.position(), self.bar.length().unwrap_or(0));
-        let left = plain.began.elapsed().as_secs_f64() * (total.saturating_sub(done)) as f64 / done.max(1) as f64;
+        let done_since = done.saturating_sub(plain.before).max(1);
+        let left = plain.began.elapsed().as_secs_f64() * (total.saturating_sub(done)) as f64 / done_since as f64;
         let left = duration(Duration::from_secs_f64(left.min(1e6)));
         let message = self.bar.message();
         plain.say(&format!("{}: {done}/{total} {}, {left} left  {message}", self.name, self.what));
@@ -206,6 +218,18 @@ mod tests {
         progress.message("loss 0.5");
         progress.inc(4);
         assert_eq!(said.lines()[1], "generate: 4/4 episodes, 0.0 s left  loss 0.5");
+    }
+
+    #[test]
+    fn what_was_done_before_does_not_shorten_the_time_that_is_left() {
+        let (progress, said) = plain(Duration::ZERO);
+        progress.carry_on_after(2);
+        std::thread::sleep(Duration::from_millis(200));
+        progress.inc(1);
+        let line = &said.lines()[1];
+        let left: f64 =
+            line.strip_prefix("generate: 3/4 episodes, ").unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(left >= 0.2, "{line}");
     }
 
     #[test]

@@ -55,10 +55,13 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     unit.dir.begin(&unit.plan)?;
     let training = spec.training(seed).resolved();
     let progress = context.progress(unit, u64::from(training.config.n_steps_in_all()), "steps");
-    let mut shown = 0;
+    let mut shown = None;
     let mut on_progress = |now: training::Progress| {
-        progress.inc(u64::from(now.step - shown));
-        shown = now.step;
+        let before = shown.replace(now.step).unwrap_or_else(|| {
+            progress.carry_on_after(u64::from(now.step - 1));
+            now.step - 1
+        });
+        progress.inc(u64::from(now.step - before));
         progress.message(&format!("loss {:.3}", now.loss));
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
