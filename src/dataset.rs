@@ -65,7 +65,7 @@ pub use convert::{RecordedEpisode, RecordingEpisodes, convert};
 pub use error::{ConvertError, DatasetError};
 pub use finding::{Finding, Severity, Validation};
 pub use lookup::{EpisodeFacts, FrameFacts, look_up};
-pub use pictures::{Decoded, EpisodePictures, EpisodeRows, PictureLoader};
+pub use pictures::{EpisodePictures, EpisodeRows, PictureLoader, Wanted};
 pub use playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
 pub use read::read_trials;
 pub use summary::{DatasetSummary, summarize};

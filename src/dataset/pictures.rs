@@ -8,13 +8,15 @@ mod measure;
 mod open_files;
 mod places;
 mod read;
+mod shelf;
 mod statistics;
 mod video;
 mod write;
 
-pub use loader::{Decoded, EpisodeRows, PictureLoader};
+pub use loader::{EpisodeRows, PictureLoader};
 pub(super) use measure::PictureMeasure;
 pub use read::EpisodePictures;
+pub use shelf::Wanted;
 pub(crate) use statistics::PictureStatistics;
 pub(super) use video::VideoFiles;
 pub(super) use write::PictureFeatures;

@@ -1,6 +1,6 @@
 //! The pictures that a variant that sees learns from: what the first camera filmed, from the dataset.
 
-use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader};
+use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader, Wanted};
 use crate::model::Pictures;
 use crate::pipeline::PipelineError;
 use crate::pipeline::runner::Context;
@@ -36,21 +36,16 @@ impl Gallery for Streamed {
         (width, height)
     }
 
-    fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
-        let decoded = self.loader.get(trial).map_err(|error| error.to_string())?;
-        let n_bytes = into.n_bytes().max(1);
-        for &frame in frames {
-            let picture = decoded.chunks_exact(n_bytes).nth(frame);
-            let gripper = self.grippers.get(trial).and_then(|grippers| grippers.get(frame));
-            let (Some(picture), Some(&gripper)) = (picture, gripper) else {
-                return Err(format!("frame {frame} has no picture or no gripper"));
-            };
-            into.push(picture, gripper);
+    fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String> {
+        let pictures = self.loader.get(wanted).map_err(|error| error.to_string())?;
+        for (&frame, picture) in wanted.frames.iter().zip(pictures) {
+            let gripper = self.grippers.get(wanted.position).and_then(|grippers| grippers.get(frame));
+            into.push(&picture, *gripper.ok_or_else(|| format!("frame {frame} has no gripper"))?);
         }
         Ok(())
     }
 
-    fn announce(&self, trials: &[usize]) {
-        self.loader.announce(trials);
+    fn announce(&self, wanted: &[Wanted]) {
+        self.loader.announce(wanted);
     }
 }

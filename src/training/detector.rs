@@ -12,7 +12,7 @@ use rand::seq::SliceRandom as _;
 use rayon::iter::{IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::DatasetTrials;
+use crate::dataset::{DatasetTrials, Wanted};
 use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world};
 use crate::seed::Seed;
 use crate::table::{self, Column, TableError, TableSchema};
@@ -21,13 +21,13 @@ use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
 use crate::training::config::TrainConfig;
 use crate::training::learner::Learner;
 use crate::training::run::dataset_hash;
-use crate::training::seen::{fetch, sample};
+use crate::training::seen::{all_frames, fetch, sample};
 use crate::training::{Gallery, Hooks, Progress, TrainError};
 
 /// Groups of a step. A fixed number, since the sum of gradients must not depend on the machine.
 const GROUPS: usize = 2;
-/// Pictures of a trial in a group, at most.
-const OF_TRIAL: usize = 8;
+/// Pictures of a trial in a group, at most. They show much the same: the more trials, the more is learned.
+const OF_TRIAL: usize = 2;
 
 /// Trials whose pictures are in memory at a time while a finished detector looks at all of them; as many are made ready.
 const PORTION: usize = 64;
@@ -140,8 +140,7 @@ impl DetectorRun<'_> {
             .map(|drawn| self.show(&drawn))
             .collect::<Result<_, TrainError>>()?;
         if standing.step + 1 < self.config.detector.n_steps() {
-            let next = self.draw(standing.step + 1).into_iter().flatten().map(|(trial, _)| trial);
-            self.gallery.announce(&next.collect::<Vec<_>>());
+            self.gallery.announce(&self.draw(standing.step + 1).concat());
         }
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
         let weight = 1.0 / GROUPS as f32;
@@ -160,7 +159,7 @@ impl DetectorRun<'_> {
     }
 
     /// What a step looks at, group by group: some trials, and a few frames of each.
-    fn draw(&self, step: u32) -> Vec<Vec<(usize, Vec<usize>)>> {
+    fn draw(&self, step: u32) -> Vec<Vec<Wanted>> {
         let seed = self.seed.derive("detector_step", &[u64::from(step)]);
         let of_group = |group: usize| {
             let mut rng = seed.derive("group", &[group as u64]).rng();
@@ -168,12 +167,12 @@ impl DetectorRun<'_> {
             let mut drawn = Vec::new();
             while n_left > 0 {
                 let trial = rng.random_range(0..self.data.trials.len());
-                let mut frames: Vec<usize> = (0..self.data.trials[trial].n_frames).collect();
+                let Wanted { position, mut frames } = all_frames(self.data, trial);
                 frames.shuffle(&mut rng);
                 frames.truncate(OF_TRIAL.min(n_left));
                 frames.sort_unstable();
                 n_left -= frames.len();
-                drawn.push((trial, frames));
+                drawn.push(Wanted { position, frames });
             }
             drawn
         };
@@ -181,14 +180,14 @@ impl DetectorRun<'_> {
     }
 
     /// A group's pictures with what is to be seen in them.
-    fn show(&self, drawn: &[(usize, Vec<usize>)]) -> Result<Shown, TrainError> {
+    fn show(&self, drawn: &[Wanted]) -> Result<Shown, TrainError> {
         let width = Observation::width(self.data.n_slots);
         let (across, down) = self.gallery.size();
         let (mut pictures, mut rows) = (Pictures::of_size(across, down), Vec::new());
-        for (trial, frames) in drawn {
-            fetch(self.data, self.gallery, *trial, frames, &mut pictures)?;
-            let observations = &self.data.trials[*trial].observations;
-            rows.extend(frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
+        for wanted in drawn {
+            fetch(self.data, self.gallery, wanted, &mut pictures)?;
+            let observations = &self.data.trials[wanted.position].observations;
+            rows.extend(wanted.frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
         }
         let positions = positions_in_world(&rows, self.data.n_slots, &pictures.grippers);
         Ok(Shown { pictures, positions })
@@ -203,13 +202,12 @@ pub(super) fn detected<D: Detector>(
 ) -> Result<DatasetTrials, TrainError> {
     let detector = detector.clone().valid();
     let (width, height) = gallery.size();
-    let of_trial = |&trial: &usize| {
+    let of_trial = |wanted: &Wanted| {
         let mut pictures = Pictures::of_size(width, height);
-        let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
-        fetch(data, gallery, trial, &frames, &mut pictures)?;
+        fetch(data, gallery, wanted, &mut pictures)?;
         Ok(detected_rows(&detector, &pictures))
     };
-    let trials: Vec<usize> = (0..data.trials.len()).collect();
+    let trials: Vec<Wanted> = (0..data.trials.len()).map(|trial| all_frames(data, trial)).collect();
     let mut observations: Vec<Vec<f32>> = Vec::with_capacity(trials.len());
     let mut portions = trials.chunks(PORTION).peekable();
     portions.peek().into_iter().for_each(|first| gallery.announce(first));

@@ -147,7 +147,7 @@ impl Run<'_> {
     /// Lets pictures be made ready for a step while the one before it is computed.
     fn announce(&self, step: u32) {
         if let Some(gallery) = self.gallery.filter(|_| step < self.config.n_steps()) {
-            gallery.announce(&seen::trials(self.examples, seen_seed(self.step_seed(step))));
+            gallery.announce(&seen::wanted(self.examples, seen_seed(self.step_seed(step))));
         }
     }
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use rand::Rng;
 
-use crate::dataset::DatasetTrials;
+use crate::dataset::{DatasetTrials, Wanted};
 use crate::model::{PictureSample, Pictures};
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
@@ -36,21 +36,26 @@ pub trait Gallery: Sync {
     /// # Errors
     ///
     /// When one cannot be read; says which and why.
-    fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String>;
+    fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String>;
 
-    /// Told which trials the next step will look at, so that their pictures can be made ready meanwhile.
-    fn announce(&self, trials: &[usize]) {
-        let _nothing_to_do = trials;
+    /// Told which frames of which trials the next step will look at, so that they can be made ready meanwhile.
+    fn announce(&self, wanted: &[Wanted]) {
+        let _nothing_to_do = wanted;
     }
 }
 
-/// The trials that a step with this seed looks at, each once.
-pub(super) fn trials(examples: &Examples<'_>, seed: Seed) -> Vec<usize> {
+/// The trials that a step with this seed looks at, each once, and most of their frames.
+pub(super) fn wanted(examples: &Examples<'_>, seed: Seed) -> Vec<Wanted> {
     let groups = (0..GROUPS).flat_map(|group| draw_pairs(examples, &mut group_seed(seed, group).rng()));
     let mut trials: Vec<usize> = groups.flatten().collect();
     trials.sort_unstable();
     trials.dedup();
-    trials
+    trials.into_iter().map(|trial| all_frames(examples.data(), trial)).collect()
+}
+
+/// Everything of a trial.
+pub(super) fn all_frames(data: &DatasetTrials, trial: usize) -> Wanted {
+    Wanted { position: trial, frames: (0..data.trials[trial].n_frames).collect() }
 }
 
 fn group_seed(seed: Seed, group: usize) -> Seed {
@@ -139,8 +144,8 @@ impl Shown {
         let mut pictures = Pictures::of_size(width, height);
         let mut by_trial: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         self.numbers.keys().for_each(|&(trial, frame)| by_trial.entry(trial).or_default().push(frame));
-        for (trial, frames) in by_trial {
-            fetch(examples.data(), gallery, trial, &frames, &mut pictures)?;
+        for (position, frames) in by_trial {
+            fetch(examples.data(), gallery, &Wanted { position, frames }, &mut pictures)?;
         }
         Ok(Group { pictures, parts: Vec::new() })
     }
@@ -168,23 +173,22 @@ pub(super) fn sample(data: &DatasetTrials, gallery: &dyn Gallery) -> Result<(Pic
     let (width, height) = gallery.size();
     let mut sample = PictureSample { pictures: Pictures::of_size(width, height), lengths: Vec::new() };
     for &trial in &sampled {
-        let frames: Vec<usize> = (0..data.trials[trial].n_frames).collect();
-        fetch(data, gallery, trial, &frames, &mut sample.pictures)?;
-        sample.lengths.push(frames.len());
+        let wanted = all_frames(data, trial);
+        fetch(data, gallery, &wanted, &mut sample.pictures)?;
+        sample.lengths.push(wanted.frames.len());
     }
     Ok((sample, sampled))
 }
 
-/// Adds pictures of a trial's frames; an error says of which trial.
+/// Adds pictures of a trial; an error says of which.
 pub(super) fn fetch(
     data: &DatasetTrials,
     gallery: &dyn Gallery,
-    trial: usize,
-    frames: &[usize],
+    wanted: &Wanted,
     into: &mut Pictures,
 ) -> Result<(), TrainError> {
-    gallery.fetch(trial, frames, into).map_err(|problem| {
-        let of = &data.trials[trial];
+    gallery.fetch(wanted, into).map_err(|problem| {
+        let of = &data.trials[wanted.position];
         TrainError::Trial { task: of.task_id.clone(), trial: of.trial, problem }
     })
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ntp::dataset::{
-    ConvertConfig, DatasetWriter, EpisodePictures, EpisodeRows, FrameChoice, PictureLoader, RecordingEpisodes, convert,
-    read_trials,
+    ConvertConfig, DatasetWriter, EpisodePictures, EpisodeRows, FrameChoice, PictureLoader, RecordingEpisodes, Wanted,
+    convert, read_trials,
 };
 use ntp::recording::{CameraPictures, RecordingError, ShardReader, ShardWriter};
 use ntp::render::{CameraConfig, PictureQuality, Viewpoint};
@@ -86,17 +86,31 @@ fn a_loader_gives_boundary_pictures_whatever_was_announced_within_its_limit() {
             let mut wanted = Vec::new();
             for EpisodeRows { episode, rows } in &list {
                 let mut bytes = Vec::new();
-                pictures.visit(*episode, rows, |picture| bytes.extend_from_slice(&picture.bytes)).unwrap();
+                pictures.visit(*episode, rows, |picture| bytes.push(picture.bytes.clone())).unwrap();
                 wanted.push(bytes);
             }
-            let largest = wanted.iter().map(Vec::len).max().unwrap();
+            let largest = wanted.iter().map(|bytes| bytes.concat().len()).max().unwrap();
+            // All pictures, one, or every second one.
+            let some = |position: usize, step: usize| {
+                let all = 0..wanted[position].len();
+                let frames = match step % 3 {
+                    0 => all.collect(),
+                    1 => vec![step % all.len()],
+                    _ => all.step_by(2).collect(),
+                };
+                Wanted { position, frames }
+            };
             for limit in [0, largest, usize::MAX] {
                 let loader = PictureLoader::open(&made.root, name, list.clone(), limit).unwrap();
                 for step in 0..3 * list.len() {
                     // What is asked for was announced, now or before, or not at all.
                     let position = (step * 7) % list.len();
-                    loader.announce(&[(position + step % 3) % list.len()]);
-                    assert!(*loader.get(position).unwrap() == wanted[position], "{name}, {step}");
+                    loader.announce(&[some((position + step % 3) % list.len(), step / 2)]);
+                    let asked = some(position, step);
+                    let found = loader.get(&asked).unwrap();
+                    assert_eq!(found.len(), asked.frames.len());
+                    let mut pairs = found.iter().zip(&asked.frames);
+                    assert!(pairs.all(|(found, &frame)| **found == wanted[position][frame]), "{name}, {step}");
                     assert!(loader.n_bytes() <= limit.max(5 * largest), "{} bytes", loader.n_bytes());
                 }
             }
@@ -112,7 +126,21 @@ fn a_loader_refuses_rows_without_pictures_before_anything_is_read() {
     let error = PictureLoader::open(&made.root, "front", list, 0).err().unwrap().to_string();
     assert!(error.contains("episode 1: observation.images.front: row 500 has no picture"), "{error}");
     let loader = PictureLoader::open(&made.root, "front", listed(&made), 0).unwrap();
-    assert!(loader.get(99).unwrap_err().to_string().contains("no pictures at position 99"));
+    let said = |position, frame| loader.get(&Wanted { position, frames: vec![frame] }).unwrap_err().to_string();
+    assert!(said(99, 0).contains("no pictures at position 99"));
+    assert!(said(0, 500).contains("no picture 500 of"));
+}
+
+#[test]
+fn a_loader_decodes_no_more_than_what_was_wanted() {
+    let made = made(FrameChoice::Boundaries);
+    let loader = PictureLoader::open(&made.root, "front", listed(&made), usize::MAX).unwrap();
+    let [width, height] = loader.size_px();
+    loader.announce(&[Wanted { position: 1, frames: vec![0, 2] }]);
+    for (frames, n_kept) in [(vec![0, 2], 2), (vec![2], 2), (vec![1, 2], 3)] {
+        loader.get(&Wanted { position: 1, frames }).unwrap();
+        assert_eq!(loader.n_bytes(), n_kept * 3 * (width * height) as usize);
+    }
 }
 
 /// What reading an episode of a changed dataset says.

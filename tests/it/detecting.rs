@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use burn::module::Module as _;
 use burn::tensor::Device;
-use ntp::dataset::DatasetTrials;
+use ntp::dataset::{DatasetTrials, Wanted};
 use ntp::geometry::{Vec3, upright};
 use ntp::model::{
     ColourSlotsConfig, Decoder, Detector, Given, ModelConfig, Network, NetworkUse, Pictures, PointDetector,
@@ -82,7 +82,7 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     // The trained policy detects what it was trained to.
     let (_, policy) = load_policy(folder.path(), Decoder::Mss).unwrap();
     let mut pictures = Painter::nothing();
-    shown.1.fetch(0, &[0, 1, 2], &mut pictures).unwrap();
+    shown.1.show(0, &[0, 1, 2], &mut pictures);
     let found = policy.detect(&pictures).unwrap();
     let truth = &shown.0.trials[0].observations[..found.len()];
     let mean = found.iter().zip(truth).map(|(found, truth)| (found - truth).abs()).sum::<f32>() / found.len() as f32;
@@ -92,8 +92,8 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
 /// Paintings that note what is fetched without being among the last two announcements, once there is one.
 struct Watched<'p> {
     paintings: &'p Paintings,
-    announced: Mutex<Vec<Vec<usize>>>,
-    surprises: Mutex<Vec<usize>>,
+    announced: Mutex<Vec<Vec<Wanted>>>,
+    surprises: Mutex<Vec<Wanted>>,
 }
 
 impl Gallery for Watched<'_> {
@@ -101,16 +101,16 @@ impl Gallery for Watched<'_> {
         self.paintings.size()
     }
 
-    fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
+    fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String> {
         let announced = self.announced.lock().unwrap();
-        if !announced.is_empty() && !announced.iter().rev().take(2).flatten().any(|&other| other == trial) {
-            self.surprises.lock().unwrap().push(trial);
+        if !announced.is_empty() && !announced.iter().rev().take(2).flatten().any(|other| other == wanted) {
+            self.surprises.lock().unwrap().push(wanted.clone());
         }
-        self.paintings.fetch(trial, frames, into)
+        self.paintings.fetch(wanted, into)
     }
 
-    fn announce(&self, trials: &[usize]) {
-        self.announced.lock().unwrap().push(trials.to_vec());
+    fn announce(&self, wanted: &[Wanted]) {
+        self.announced.lock().unwrap().push(wanted.to_vec());
     }
 }
 
@@ -125,14 +125,14 @@ fn a_finished_detector_looks_at_all_trials_a_portion_at_a_time() {
         .unwrap();
     let announced = watched.announced.into_inner().unwrap();
     assert!(announced.iter().all(|trials| trials.len() < 70), "all at once");
-    assert_eq!(announced.iter().flatten().filter(|&&trial| trial == 139).count(), 1);
-    assert_eq!(watched.surprises.into_inner().unwrap(), [0; 0]);
+    assert_eq!(announced.iter().flatten().filter(|wanted| wanted.position == 139).count(), 1);
+    assert_eq!(watched.surprises.into_inner().unwrap(), []);
 }
 
 /// Pictures of a demonstration, and the same of a robot whose gripper is said to be elsewhere and the other way open.
 fn with_gripper_moved(by: [f32; 3]) -> [Pictures; 2] {
     let mut pictures = Painter::nothing();
-    shown(1).1.fetch(0, &[0, 1, 2], &mut pictures).unwrap();
+    shown(1).1.show(0, &[0, 1, 2], &mut pictures);
     let mut moved = pictures.clone();
     for GripperState { in_world_m, closed } in &mut moved.grippers {
         *in_world_m = [0, 1, 2].map(|axis| in_world_m[axis] + by[axis]);
@@ -167,7 +167,7 @@ fn detected_positions_move_with_the_gripper_that_they_are_relative_to() {
 fn a_detector_is_told_of_the_gripper_what_a_frame_s_state_says() {
     let (data, paintings) = shown(1);
     let mut pictures = Painter::nothing();
-    paintings.fetch(0, &[0, 2, 5], &mut pictures).unwrap();
+    paintings.show(0, &[0, 2, 5], &mut pictures);
     let told: Vec<GripperState> = [0, 2, 5].map(|frame| data.trials[0].grippers[frame]).into();
     assert_eq!(pictures.grippers, told);
     let closed = |frame: usize| data.trials[0].observations[frame * 26 + 25] > 0.5;

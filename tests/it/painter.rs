@@ -1,5 +1,6 @@
 //! Toy pictures of a tabletop for tests: flat coloured squares, seen from the front and above.
 
+use ntp::dataset::Wanted;
 use ntp::geometry::Vec3;
 use ntp::model::Pictures;
 use ntp::rollout::{Eye, Sight};
@@ -94,17 +95,23 @@ impl Painter {
 /// Pictures of the boundary frames of episodes.
 pub(crate) struct Paintings(pub(crate) Vec<Episode>);
 
-impl Gallery for Paintings {
-    fn size(&self) -> (usize, usize) {
-        (PIXELS, PIXELS)
-    }
-
-    fn fetch(&self, trial: usize, frames: &[usize], into: &mut Pictures) -> Result<(), String> {
+impl Paintings {
+    pub(crate) fn show(&self, trial: usize, frames: &[usize], into: &mut Pictures) {
         let episode = &self.0[trial];
         let boundaries: Vec<&Frame> = episode.boundary_frames().map(|(_, frame)| frame).collect();
         for frame in frames.iter().map(|&frame| boundaries[frame]) {
             into.push(&Painter.paint(&episode.scene, frame), frame.gripper());
         }
+    }
+}
+
+impl Gallery for Paintings {
+    fn size(&self) -> (usize, usize) {
+        (PIXELS, PIXELS)
+    }
+
+    fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String> {
+        self.show(wanted.position, &wanted.frames, into);
         Ok(())
     }
 }

@@ -13,7 +13,7 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, GripperState, Provenance, SpecificationForm};
-use ntp::training::{Gallery as _, Hooks, TrainConfig, Training, train, train_seeing};
+use ntp::training::{Hooks, TrainConfig, Training, train, train_seeing};
 
 use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
 use crate::painter::{Painter, Paintings};
@@ -50,14 +50,14 @@ fn colour_slots_find_each_block_and_the_robot_first() {
     let mut sample = PictureSample { pictures: Painter::nothing(), lengths: Vec::new() };
     for (idx, episode) in paintings.0.iter().enumerate() {
         let n_frames = episode.boundary_frames().count();
-        paintings.fetch(idx, &(0..n_frames).collect::<Vec<_>>(), &mut sample.pictures).unwrap();
+        paintings.show(idx, &(0..n_frames).collect::<Vec<_>>(), &mut sample.pictures);
         sample.lengths.push(n_frames);
     }
     let config = ColourSlotsConfig { pixels: 64, colours: 9 };
     let mut slots = ColourSlots::fresh(&config, Seed(1), &Device::flex());
     slots = slots.acquainted(&sample, Seed(2));
     let mut first = Painter::nothing();
-    paintings.fetch(0, &[0], &mut first).unwrap();
+    paintings.show(0, &[0], &mut first);
     let found = values(slots.look(&first).0);
     let episode = &paintings.0[0];
     let seen: Vec<[f32; 2]> = found.as_chunks::<4>().0.iter().map(|percept| [percept[0], percept[1]]).collect();
@@ -79,7 +79,7 @@ fn the_paper_s_picture_network_has_seven_layers_and_a_vector_of_128() {
     assert_eq!(network.num_params(), flattened + pictures + 3 * (128 - 50) * 96);
     let mut painted = Painter::nothing();
     let (_, paintings) = shown(&[tower("a", &[0, 1], Split::Seen)], 1);
-    paintings.fetch(0, &[0, 1, 0], &mut painted).unwrap();
+    paintings.show(0, &[0, 1, 0], &mut painted);
     let features = values(network.perceive(&painted));
     assert_eq!(features.len(), 3 * 128);
     assert_eq!(features[..128], features[256..]);

@@ -5,12 +5,12 @@
 //! What is given out depends on the dataset alone, not on what was announced or how fast the thread is. Memory holds
 //! decoded pictures up to a limit; above it only those of the last two announcements stay.
 
-use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use crate::artifact::IoError;
+use crate::dataset::pictures::shelf::{Decoded, Shelf, Wanted};
 use crate::dataset::{DatasetError, EpisodePictures};
 
 /// Some rows of an episode.
@@ -29,34 +29,11 @@ pub struct PictureLoader {
     worker: Option<JoinHandle<()>>,
 }
 
-/// `[row, height, width, 3]`, a byte each; or why there are none.
-pub type Decoded = Result<Arc<Vec<u8>>, Arc<DatasetError>>;
-
 struct Shared {
     root: PathBuf,
     list: Vec<EpisodeRows>,
     shelf: Mutex<Shelf>,
     changed: Condvar,
-}
-
-/// What is decoded, and what is to be.
-#[derive(Default)]
-struct Shelf {
-    most_bytes: usize,
-    n_bytes: usize,
-    /// Announcements so far.
-    turn: u64,
-    queue: VecDeque<usize>,
-    /// What the thread works on.
-    busy: Option<usize>,
-    decoded: BTreeMap<usize, Kept>,
-    has_ended: bool,
-}
-
-struct Kept {
-    pictures: Decoded,
-    /// The announcement at which it was wanted last.
-    turn: u64,
 }
 
 impl PictureLoader {
@@ -69,7 +46,7 @@ impl PictureLoader {
         let pictures = EpisodePictures::open(root, camera)?;
         list.iter().try_for_each(|item| pictures.check_rows(item.episode, &item.rows))?;
         let size_px = pictures.size_px();
-        let shelf = Mutex::new(Shelf { most_bytes, ..Shelf::default() });
+        let shelf = Mutex::new(Shelf::new(most_bytes));
         let shared = Arc::new(Shared { root: root.to_owned(), list, shelf, changed: Condvar::new() });
         let of_thread = Arc::clone(&shared);
         let worker = Builder::new().name("pictures".to_owned()).spawn(move || of_thread.work(pictures));
@@ -82,34 +59,27 @@ impl PictureLoader {
         self.size_px
     }
 
-    /// Says which positions of the list will be wanted next; they are decoded in this order.
-    pub fn announce(&self, positions: &[usize]) {
-        let mut shelf = self.shared.lock();
-        shelf.turn += 1;
-        for &position in positions {
-            shelf.want(position);
-        }
+    /// Says what will be wanted next; it is decoded in this order.
+    pub fn announce(&self, wanted: &[Wanted]) {
+        self.shared.lock().announce(wanted);
         self.shared.changed.notify_all();
     }
 
-    /// The pictures at a position of the list; waits for them.
+    /// Pictures `[height, width, 3]`, a byte each; waits for them.
     ///
     /// # Errors
     ///
-    /// As [`EpisodePictures::visit`].
-    pub fn get(&self, position: usize) -> Decoded {
+    /// As [`EpisodePictures::visit`], or when the list has none there.
+    pub fn get(&self, wanted: &Wanted) -> Result<Vec<Arc<Vec<u8>>>, Arc<DatasetError>> {
         let mut shelf = self.shared.lock();
         loop {
-            if let Some(kept) = shelf.decoded.get(&position) {
-                return kept.pictures.clone();
+            if let Some(found) = shelf.find(wanted) {
+                return found;
             }
             if shelf.has_ended {
-                let problem = "the thread that decodes pictures has ended".to_owned();
-                return Err(Arc::new(DatasetError::Count { path: self.shared.root.clone(), problem }));
+                return Err(self.shared.wrong("the thread that decodes pictures has ended".to_owned()));
             }
-            if shelf.busy != Some(position) {
-                shelf.queue.retain(|&other| other != position);
-                shelf.queue.push_front(position);
+            if shelf.hurry(wanted) {
                 self.shared.changed.notify_all();
             }
             shelf = self.shared.changed.wait(shelf).unwrap_or_else(PoisonError::into_inner);
@@ -118,7 +88,7 @@ impl PictureLoader {
 
     /// Bytes of decoded pictures that are kept now.
     pub fn n_bytes(&self) -> usize {
-        self.shared.lock().n_bytes
+        self.shared.lock().n_bytes()
     }
 }
 
@@ -140,38 +110,56 @@ impl Shared {
         self.changed.notify_all();
     }
 
+    fn wrong(&self, problem: String) -> Arc<DatasetError> {
+        Arc::new(DatasetError::Count { path: self.root.clone(), problem })
+    }
+
     /// What the thread does until the end.
     fn work(&self, mut pictures: EpisodePictures) {
         let _ending = Ending(self);
-        while let Some(position) = self.next() {
-            let decoded = self.decode(&mut pictures, position);
-            self.lock().keep(position, decoded);
+        while let Some(wanted) = self.next() {
+            let decoded = self.decode(&mut pictures, &wanted);
+            self.lock().keep(&wanted, decoded);
             self.changed.notify_all();
         }
     }
 
     /// Waits for something to decode; nothing at the end.
-    fn next(&self) -> Option<usize> {
+    fn next(&self) -> Option<Wanted> {
         let mut shelf = self.lock();
         while !shelf.has_ended {
-            shelf.busy = shelf.queue.pop_front();
-            if shelf.busy.is_some() {
-                return shelf.busy;
+            let next = shelf.begin();
+            if next.is_some() {
+                return next;
             }
             shelf = self.changed.wait(shelf).unwrap_or_else(PoisonError::into_inner);
         }
         None
     }
 
-    fn decode(&self, pictures: &mut EpisodePictures, position: usize) -> Decoded {
-        let Some(EpisodeRows { episode, rows }) = self.list.get(position) else {
-            let problem = format!("no pictures at position {position} of {}", self.list.len());
-            return Err(Arc::new(DatasetError::Count { path: self.root.clone(), problem }));
+    /// One for each that is wanted.
+    fn decode(&self, pictures: &mut EpisodePictures, wanted: &Wanted) -> Vec<Decoded> {
+        let mut decoded = Vec::with_capacity(wanted.frames.len());
+        let outcome = self.rows(wanted).and_then(|(episode, rows)| {
+            let visit = pictures.visit(episode, &rows, |picture| decoded.push(Ok(Arc::new(picture.bytes.clone()))));
+            visit.map_err(Arc::new)
+        });
+        // What follows a picture that cannot be read has not been read either.
+        decoded.resize(wanted.frames.len(), outcome.map(|()| Arc::default()));
+        decoded
+    }
+
+    /// The episode, and which of its rows.
+    fn rows(&self, wanted: &Wanted) -> Result<(usize, Vec<u32>), Arc<DatasetError>> {
+        let Wanted { position, frames } = wanted;
+        let Some(EpisodeRows { episode, rows }) = self.list.get(*position) else {
+            return Err(self.wrong(format!("no pictures at position {position} of {}", self.list.len())));
         };
-        let [width, height] = pictures.size_px().map(|pixels| pixels as usize);
-        let mut bytes = Vec::with_capacity(rows.len() * width * height * 3);
-        pictures.visit(*episode, rows, |picture| bytes.extend_from_slice(&picture.bytes)).map_err(Arc::new)?;
-        Ok(Arc::new(bytes))
+        let row = |&frame: &usize| {
+            let beyond = || self.wrong(format!("no picture {frame} of {} at position {position}", rows.len()));
+            rows.get(frame).copied().ok_or_else(beyond)
+        };
+        Ok((*episode, frames.iter().map(row).collect::<Result<_, _>>()?))
     }
 }
 
@@ -182,30 +170,4 @@ impl Drop for Ending<'_> {
     fn drop(&mut self) {
         self.0.end();
     }
-}
-
-impl Shelf {
-    /// Keeps what is there, and queues what is not.
-    fn want(&mut self, position: usize) {
-        match self.decoded.get_mut(&position) {
-            Some(kept) => kept.turn = self.turn,
-            None if self.busy == Some(position) || self.queue.contains(&position) => {}
-            None => self.queue.push_back(position),
-        }
-    }
-
-    fn keep(&mut self, position: usize, pictures: Decoded) {
-        self.busy = None;
-        self.n_bytes += size(&pictures);
-        self.decoded.insert(position, Kept { pictures, turn: self.turn });
-        while self.n_bytes > self.most_bytes {
-            let old = self.decoded.iter().filter(|(_, kept)| kept.turn + 1 < self.turn);
-            let Some(oldest) = old.min_by_key(|(_, kept)| kept.turn).map(|(&position, _)| position) else { return };
-            self.n_bytes -= self.decoded.remove(&oldest).map_or(0, |kept| size(&kept.pictures));
-        }
-    }
-}
-
-fn size(pictures: &Decoded) -> usize {
-    pictures.as_ref().map_or(0, |bytes| bytes.len())
 }
