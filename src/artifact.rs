@@ -12,6 +12,7 @@ mod atomic;
 mod contract;
 mod lock;
 mod staging;
+mod unfinished;
 
 pub use atomic::{
     AtomicFile, IoError, PARTIAL_PREFIX, create_dir, hex, read, read_json, remove_partials, sha256_bytes, sha256_file,
@@ -20,3 +21,4 @@ pub use atomic::{
 pub use contract::{ContractError, FileEntry, Manifest, Plan, Receipt, StageDir};
 pub use lock::{LockError, RunLock};
 pub use staging::{StagedDir, StagingError};
+pub use unfinished::remove_unfinished;

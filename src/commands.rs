@@ -21,6 +21,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::artifact::remove_unfinished;
 use crate::cli::{Cli, Command};
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
@@ -45,9 +46,11 @@ struct UsageError(String);
 pub fn execute(cli: &Cli) -> ExitCode {
     let stop = Arc::new(AtomicBool::new(false));
     let on_signal = Arc::clone(&stop);
-    // A second Ctrl-C ends at once.
+    let stops_in_order = stops_in_order(&cli.command);
+    // A second Ctrl-C ends at once, and the first where there is nothing to carry on.
     let handler = ctrlc::set_handler(move || {
-        if on_signal.swap(true, Ordering::Relaxed) {
+        if on_signal.swap(true, Ordering::Relaxed) || !stops_in_order {
+            remove_unfinished();
             std::process::exit(130);
         }
     });
@@ -61,6 +64,30 @@ pub fn execute(cli: &Cli) -> ExitCode {
             output::complain(&error);
             ExitCode::from(exit_code(&error))
         }
+    }
+}
+
+/// Whether a command, when it is interrupted, keeps what is done, so that it can be carried on.
+fn stops_in_order(command: &Command) -> bool {
+    match command {
+        Command::Run(_)
+        | Command::Tasks(_)
+        | Command::Generate(_)
+        | Command::Convert(_)
+        | Command::Train(_)
+        | Command::Rollout(_)
+        | Command::Report(_)
+        | Command::Publish(_) => true,
+        Command::Inspect(_)
+        | Command::Validate(_)
+        | Command::Replay(_)
+        | Command::Render(_)
+        | Command::Query(_)
+        | Command::Explain(_)
+        | Command::Repair(_)
+        | Command::Dataset(_)
+        | Command::Verify(_)
+        | Command::Completions { .. } => false,
     }
 }
 

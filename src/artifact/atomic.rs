@@ -9,6 +9,8 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
+use crate::artifact::unfinished::Unfinished;
+
 /// How names begin of what is not whole yet.
 pub const PARTIAL_PREFIX: &str = ".partial-";
 
@@ -56,6 +58,7 @@ impl IoError {
 pub struct AtomicFile {
     writer: BufWriter<NamedTempFile>,
     path: PathBuf,
+    unfinished: Unfinished,
 }
 
 impl AtomicFile {
@@ -71,7 +74,8 @@ impl AtomicFile {
             .prefix(PARTIAL_PREFIX)
             .tempfile_in(folder)
             .map_err(IoError::system("create a temporary file in", folder))?;
-        Ok(Self { writer: BufWriter::with_capacity(1 << 18, file), path: path.to_owned() })
+        let unfinished = Unfinished::note(file.path());
+        Ok(Self { writer: BufWriter::with_capacity(1 << 18, file), path: path.to_owned(), unfinished })
     }
 
     /// Flushes, syncs and renames to the final name, replacing what was there.
@@ -80,11 +84,12 @@ impl AtomicFile {
     ///
     /// When the disk is full or the name cannot be taken; then nothing is at the final name that was not before.
     pub fn commit(self) -> Result<(), IoError> {
-        let Self { writer, path } = self;
+        let Self { writer, path, unfinished } = self;
         let file = writer.into_inner().map_err(|error| IoError::system("write", &path)(error.into_error()))?;
         file.as_file().sync_all().map_err(IoError::system("sync", &path))?;
         set_usual_permissions(file.as_file()).map_err(IoError::system("set permissions of", &path))?;
         file.persist(&path).map_err(|error| IoError::system("rename to", &path)(error.error))?;
+        drop(unfinished);
         sync_folder(&path)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::artifact::unfinished::Unfinished;
 use crate::artifact::{IoError, LockError, PARTIAL_PREFIX, RunLock, create_dir};
 
 const LOCK: &str = ".lock";
@@ -31,6 +32,7 @@ pub struct StagedDir {
     path: PathBuf,
     is_committed: bool,
     _lock: RunLock,
+    _unfinished: Unfinished,
 }
 
 impl StagedDir {
@@ -43,7 +45,8 @@ impl StagedDir {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let partial = path.with_file_name(format!("{PARTIAL_PREFIX}{name}"));
         let lock = RunLock::take(&partial)?;
-        let staged = Self { partial, path: path.to_owned(), is_committed: false, _lock: lock };
+        let unfinished = Unfinished::note(&partial);
+        let staged = Self { partial, path: path.to_owned(), is_committed: false, _lock: lock, _unfinished: unfinished };
         if name.is_empty() || !is_empty(path)? {
             return Err(StagingError::NotEmpty { path: path.to_owned() });
         }

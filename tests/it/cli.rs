@@ -76,3 +76,28 @@ fn inspect_says_what_each_part_of_a_run_is() {
         assert_eq!(kind(part), expected, "{part}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_carried_on_ends_at_the_first_interrupt_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    ntp().args(["run", "pipelines/smoke.toml", "--to", "generate", "--out"]).arg(&out).assert().success();
+    let clips = folder.path().join("clips");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_ntp"))
+        .args(["render", "--episode", "0", "--size", "1920x1080", "--fps", "60"])
+        .arg(out.join("recordings"))
+        .arg("--mp4")
+        .arg(clips.join("long.mp4"))
+        .spawn()
+        .unwrap();
+    let has_begun = || std::fs::read_dir(&clips).is_ok_and(|mut entries| entries.next().is_some());
+    while !has_begun() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before it was interrupted");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupt.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!has_begun(), "something is left");
+}
