@@ -1,9 +1,9 @@
 //! Domain randomisation: another light, other colours and a moved camera for each episode.
 
-use rand::Rng as _;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Rotation, Vec3};
+use crate::geometry::{Point, Pose, Rotation, Vec3};
 use crate::render::camera::{Camera, Mount};
 use crate::render::look::{Letters, Look};
 use crate::scene::{Mobility, Scene};
@@ -27,6 +27,10 @@ pub struct Randomization {
     pub one_color: bool,
 }
 
+/// How often a camera's pose is drawn anew when it looks past the table.
+const TRIES: u32 = 100;
+/// How far from the middle of the picture the table's may lie, as a share of the picture's sides.
+const FARTHEST_CENTER: f32 = 0.4;
 /// Where a randomised sun stands at least, over the level length of its direction.
 const MIN_SUN_HEIGHT: f32 = 0.8;
 
@@ -83,12 +87,19 @@ impl Randomization {
         look
     }
 
-    /// The camera of an episode, given the usual one.
+    /// The camera of an episode, given the usual one. One that stands still and has the table's middle in its picture
+    /// keeps it there.
     pub fn camera(&self, usual: &Camera, seed: Seed) -> Camera {
         let mut rng = seed.derive("camera", &[]).rng();
+        let must_see = sees_the_middle(usual);
+        let mut moved = (0..TRIES).map(|_| self.moved(usual, &mut rng));
+        moved.find(|moved| !must_see || sees_the_middle(moved)).unwrap_or(*usual)
+    }
+
+    fn moved(&self, usual: &Camera, rng: &mut impl Rng) -> Camera {
         let mut anywhere = |reach: f32| Vec3::from_fn(|_, _| reach * (2.0 * rng.random::<f32>() - 1.0));
         let (shift, turn) = (anywhere(self.camera_m), Rotation::from_scaled_axis(anywhere(self.camera_rad)));
-        let moved = |mut pose: crate::geometry::Pose| {
+        let moved = |mut pose: Pose| {
             pose.translation.vector += shift;
             pose.rotation *= turn;
             pose
@@ -99,6 +110,15 @@ impl Randomization {
         };
         Camera { mount, ..*usual }
     }
+}
+
+/// Whether a camera stands still and has the middle of the table well in its picture.
+fn sees_the_middle(camera: &Camera) -> bool {
+    let Mount::World(in_world) = camera.mount else { return false };
+    let middle = in_world.inverse_transform_point(&Point::origin());
+    let is_within =
+        |offset: f32, side: u32| (camera.focal_px * offset / middle.z).abs() <= FARTHEST_CENTER * side as f32;
+    middle.z > 0.0 && is_within(middle.x, camera.width) && is_within(middle.y, camera.height)
 }
 
 fn shifted(channel: u8, by: f32) -> u8 {

@@ -183,6 +183,18 @@ fn every_body_that_the_camera_sees_is_drawn_with_its_own_number() {
 }
 
 #[test]
+fn a_camera_that_moves_as_far_as_is_allowed_keeps_the_middle_of_the_table_in_its_picture() {
+    let randomize = Randomization { camera_m: 0.5, camera_rad: 0.5, ..Randomization::default() };
+    let config = CameraConfig { randomize, ..CameraConfig::new(Viewpoint::Front, [64, 48]) };
+    let (_, state) = cube_scene();
+    for seed in 0..300 {
+        let camera = config.camera(Family::BlockStacking, Seed(seed));
+        let [column, row, _] = camera.project(&state, &Vec3::zeros()).unwrap();
+        assert!((5.0..58.0).contains(&column) && (3.0..44.0).contains(&row), "seed {seed}: {column}, {row}");
+    }
+}
+
+#[test]
 fn a_randomised_episode_depends_on_its_seed_alone() {
     let (scene, state) = cube_scene();
     let all = Randomization { light: 1.0, color: 1.0, camera_m: 0.03, camera_rad: 0.05, one_color: false };
