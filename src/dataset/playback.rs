@@ -18,7 +18,7 @@ use crate::dataset::lookup::{episode_facts, find, read_calls};
 use crate::dataset::pictures::{PREFIX, video_columns};
 use crate::dataset::schema::META_EPISODES;
 use crate::dataset::statistics::{NumericFeature, copy_values};
-use crate::dataset::{DatasetError, EpisodeFacts};
+use crate::dataset::{DatasetError, EpisodeFacts, EpisodePictures};
 use crate::table::{BatchReader, ColumnKind, Form, TableError, Value, read_further};
 
 /// Numbers of rows and labels, which calls and times show already.
@@ -77,7 +77,8 @@ pub enum TrackPictures {
 ///
 /// # Errors
 ///
-/// When there is no such episode, with how many there are; or a table or a video cannot be read.
+/// When there is no such episode, with how many there are; or a table or a video cannot be read; or a picture of a
+/// dataset of ours cannot be decoded.
 pub fn play_back(root: &Path, episode: u64) -> Result<Playback, DatasetError> {
     let info: Info = read_json(&root.join(layout::INFO))?;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
@@ -89,6 +90,9 @@ pub fn play_back(root: &Path, episode: u64) -> Result<Playback, DatasetError> {
         [begin, if is_shared { end.saturating_sub(1).max(begin.saturating_add(1)) } else { end }]
     };
     let running = calls.iter().map(|call| until(call.frames)).collect();
+    if is_shared {
+        check_pictures(root, episode)?;
+    }
     let frames = Frames::read(root, &found.row, found.frames_before)?;
     let cameras = info.features.0.iter().filter_map(|(name, feature)| camera(root, &found.row, &frames, name, feature));
     Ok(Playback {
@@ -98,6 +102,12 @@ pub fn play_back(root: &Path, episode: u64) -> Result<Playback, DatasetError> {
         cameras: cameras.collect::<Result<_, _>>()?,
         facts: episode_facts(found.row, calls),
     })
+}
+
+/// Makes sure that what is shown can be decoded. Datasets that were annotated elsewhere have codecs of their own.
+fn check_pictures(root: &Path, episode: u64) -> Result<(), DatasetError> {
+    let position = usize::try_from(episode).unwrap_or(usize::MAX);
+    EpisodePictures::cameras(root)?.iter().try_for_each(|camera| EpisodePictures::open(root, camera)?.check(position))
 }
 
 /// The rows of an episode, with all their columns.

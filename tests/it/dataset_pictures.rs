@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use ntp::dataset::edit::{Condition, SplitBy, diff, filter, merge, repair, split};
-use ntp::dataset::{ConvertConfig, EpisodePictures, FrameChoice, RecordingEpisodes, convert, read_trials, validate};
+use ntp::dataset::{
+    ConvertConfig, EpisodePictures, FrameChoice, RecordingEpisodes, convert, play_back, read_trials, validate,
+};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{CameraConfig, PictureFormat, Renderer, Viewpoint};
 use ntp::seed::Seed;
@@ -330,4 +332,22 @@ fn pictures_that_do_not_fit_together_are_refused_by_name() {
     let text = std::fs::read_to_string(&info).unwrap();
     std::fs::write(&info, text.replace("\"h264\"", "\"av1\"")).unwrap();
     refused(&[a, b], "edit.video", "av1");
+}
+
+#[test]
+fn one_damaged_picture_in_the_middle_of_an_episode_is_found_and_not_shown() {
+    let made = made(FrameChoice::Boundaries);
+    let path = made.root.join("data/chunk-000/file-000.parquet");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let png = b"\x89PNG";
+    let damaged = (0..bytes.len() - 4).filter(|&at| &bytes[at..at + 4] == png).nth(5).unwrap();
+    bytes[damaged..damaged + 4].fill(0);
+    std::fs::write(&path, bytes).unwrap();
+    let said = "observation.images.front: picture of row 5: failed to decode PNG";
+    let findings = validate(&made.root).findings;
+    let [one] = &findings[..] else { panic!("{findings:?}") };
+    assert_eq!((one.code, one.place.as_str()), ("pictures.decode", "episode 0"));
+    assert!(one.message.contains(said), "{findings:?}");
+    assert!(play_back(&made.root, 0).unwrap_err().to_string().contains(&format!("episode 0: {said}")));
+    assert!(play_back(&made.root, 1).is_ok());
 }

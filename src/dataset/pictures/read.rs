@@ -154,16 +154,13 @@ impl EpisodePictures {
         self.find(episode, rows).map(|_| ())
     }
 
-    /// Decodes the first and the last picture of an episode, and of a video what is between.
+    /// Decodes all pictures of an episode.
     ///
     /// # Errors
     ///
     /// As [`EpisodePictures::visit`].
-    pub fn check_ends(&mut self, episode: usize) -> Result<(), DatasetError> {
-        let rows = match (&self.files, self.n_pictures(episode) as u32) {
-            (Files::Images(_), n_pictures @ 3..) => vec![0, n_pictures - 1],
-            (Files::Images(_) | Files::Videos(_), _) => self.rows(episode)?,
-        };
+    pub fn check(&mut self, episode: usize) -> Result<(), DatasetError> {
+        let rows = self.rows(episode)?;
         self.visit(episode, &rows, |_| {})
     }
 
