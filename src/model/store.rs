@@ -60,7 +60,7 @@ pub enum ModelError {
     /// The model is for other scenes.
     #[error("model is for {field} {found}, but {expected} is asked for: {}", path.display())]
     Purpose {
-        /// `variant`, `family`, `specification` or `n_slots`.
+        /// `variant`, `family`, `specification`, `n_slots` or `pictures`.
         field: &'static str,
         /// As found.
         found: String,
@@ -138,7 +138,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         ("family", config.family.name().to_owned(), wanted.family.name().to_owned()),
         ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
         ("n_slots", config.n_slots.to_string(), wanted.n_slots.to_string()),
-        ("pixels across a picture", pixels(config), pixels(wanted)),
+        ("pictures", pixels(config), pixels(wanted)),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
         Some((field, found, expected)) => {
@@ -149,7 +149,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
 }
 
 fn pixels(config: &ModelConfig) -> String {
-    config.network.pixels().map_or("none".to_owned(), |pixels| pixels.to_string())
+    config.network.pixels().map_or("none".to_owned(), |pixels| format!("of {pixels}x{pixels} pixels"))
 }
 
 /// Loads a trained model for inference and hands its network on.
