@@ -29,7 +29,16 @@ pub(super) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
 
 /// Prints what went wrong. Nothing is left to do when stderr is closed.
 pub(super) fn complain(error: &anyhow::Error) {
-    let _closed = writeln!(std::io::stderr().lock(), "ntp: {error:#}");
+    let _closed = writeln!(std::io::stderr().lock(), "ntp: {}", in_words(error));
+}
+
+/// An error with its causes, each said once: many tell their cause themselves.
+fn in_words(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |said, cause| match said.contains(&cause) {
+        true => said,
+        false if said.is_empty() => cause,
+        false => format!("{said}: {cause}"),
+    })
 }
 
 /// Prints a note that is no result.
@@ -41,4 +50,20 @@ pub(super) fn note(text: &str) {
 pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let io = error.downcast_ref::<std::io::Error>();
     io.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context as _;
+
+    use super::in_words;
+
+    #[test]
+    fn a_cause_that_was_told_is_not_told_again() {
+        let error = || std::io::Error::other("disk is full");
+        let told = Err::<(), _>(error()).context("failed to write a: disk is full").unwrap_err();
+        assert_eq!(in_words(&told), "failed to write a: disk is full");
+        let untold = Err::<(), _>(error()).context("failed to write a").unwrap_err();
+        assert_eq!(in_words(&untold), "failed to write a: disk is full");
+    }
 }
