@@ -9,6 +9,7 @@ use crate::dataset::edit::Ending;
 use crate::dataset::export::LabelForm;
 use crate::pipeline::Stage;
 use crate::publish::{Date, License, Place, Release};
+use crate::render::Channel;
 use crate::task::{Family, Split};
 
 /// Neural Task Programming as a dataset pipeline.
@@ -176,18 +177,26 @@ pub struct RenderArgs {
     /// Which episode, by its number.
     #[arg(long, value_name = "K")]
     pub episode: u64,
-    /// From where: front or wrist.
-    #[arg(long, value_name = "NAME", default_value = "front", value_parser = ["front", "wrist"])]
+    /// From where: front, wrist, or a camera that the recording names.
+    #[arg(long, value_name = "NAME", default_value = "front")]
     pub camera: String,
-    /// Width and height in pixels: one even number, or two as 640x480.
-    #[arg(long, value_name = "PIXELS", default_value = "480")]
-    pub size: String,
+    /// As the recording's camera of that name filmed, with its size, quality and what was randomized; otherwise
+    /// pictures for people are drawn from its place.
+    #[arg(long)]
+    pub as_filmed: bool,
+    /// Width and height in pixels: one even number, or two as 640x480 [default: 480, or as filmed].
+    #[arg(long, value_name = "PIXELS")]
+    pub size: Option<String>,
     /// Pictures a second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=60))]
     pub fps: u32,
     /// With --png: which recorded frame [default: the last].
-    #[arg(long, value_name = "N", requires = "png")]
+    #[arg(long, value_name = "N", conflicts_with_all = ["mp4", "gif"])]
     pub frame: Option<usize>,
+    /// With --png: color, depth (16 bits of grey, in millimetres, 0 for nothing) or segments (8 bits of grey:
+    /// background 0, table 1, gripper 2, then the bodies).
+    #[arg(long, value_name = "WHAT", default_value = "color", conflicts_with_all = ["mp4", "gif"])]
+    pub show: Channel,
     /// Write a video.
     #[arg(long, value_name = "FILE", group = "output", required_unless_present_any = ["gif", "png"])]
     pub mp4: Option<PathBuf>,

@@ -32,7 +32,7 @@ mod visibility;
 pub use camera::{Camera, Mount, looking_at};
 pub use config::{CameraConfig, CameraError, PictureFormat, PictureQuality, Viewpoint};
 pub use look::{Letters, Light, Look, Shadows};
-pub use picture::{Picture, Segment};
+pub use picture::{Channel, Picture, Segment};
 pub use randomize::Randomization;
 pub use renderer::Renderer;
 pub use visibility::Visibility;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde_json::{Value, json};
 
-use crate::artifact::Plan;
+use crate::artifact::{Manifest, Plan, read_json};
 use crate::cli::ReplayArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
@@ -20,14 +20,14 @@ use crate::trace::{Actor, Episode, Push};
 use crate::visualize::{self, Replay};
 
 /// An episode, with what is to be shown beside it.
-struct Found {
+pub(super) struct Found {
     number: u64,
-    file: PathBuf,
+    pub(super) file: PathBuf,
     plan: Plan,
-    episode: Episode,
+    pub(super) episode: Episode,
     demonstration: Option<Episode>,
     divergence: Option<Divergence>,
-    cameras: Vec<CameraConfig>,
+    pub(super) cameras: Vec<CameraConfig>,
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
@@ -164,16 +164,13 @@ fn secs_of(episode: &Episode, frame: u32) -> f64 {
     episode.frames.get(frame as usize).map_or(0.0, |frame| frame.time_nanos as f64 / 1e9)
 }
 
-/// The recording that an episode is in, and the episode; counted as [`find`] does.
-pub(super) fn find_one(path: &Path, number: u64) -> anyhow::Result<(PathBuf, Episode)> {
-    let found = find(path, &[number])?.into_iter().next().context("an episode that was found")?;
-    Ok((found.file, found.episode))
-}
-
 /// The episodes of some numbers, counted through the recording, or through the recordings of a folder in order of
 /// names.
-fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
+pub(super) fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
     let files = recordings(path)?;
+    if let Some(folder) = files[0].parent().filter(|_| path.is_dir()) {
+        check_listed(folder)?;
+    }
     let mut found = Vec::new();
     let mut n_episodes = 0;
     for file in &files {
@@ -238,4 +235,18 @@ pub(super) fn recordings(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     anyhow::bail!("no recording (.mcap) in {}", path.display())
+}
+
+/// Makes sure that every recording is there that a finished stage wrote: episodes are counted through all of them.
+fn check_listed(folder: &Path) -> anyhow::Result<()> {
+    let manifest = folder.join("manifest.json");
+    if !manifest.is_file() {
+        return Ok(());
+    }
+    let listed: Manifest = read_json(&manifest)?;
+    let mut missing = listed.files.iter().map(|file| folder.join(&file.path)).filter(|file| !file.is_file());
+    match missing.next() {
+        Some(file) => anyhow::bail!("{}: missing, but listed in {}", file.display(), manifest.display()),
+        None => Ok(()),
+    }
 }

@@ -2,6 +2,30 @@
 
 use crate::scene::BodyIndex;
 
+/// What a picture tells of each pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Red, green, blue.
+    Color,
+    /// How far away it is.
+    Depth,
+    /// What it shows: [`Segment::number`].
+    Segments,
+}
+
+impl std::str::FromStr for Channel {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "color" => Ok(Self::Color),
+            "depth" => Ok(Self::Depth),
+            "segments" => Ok(Self::Segments),
+            _ => Err(format!("unknown channel {word:?}; allowed: color, depth, segments")),
+        }
+    }
+}
+
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Segment {
@@ -67,6 +91,13 @@ impl Picture {
     pub fn color(&self, column: u32, row: u32) -> [u8; 3] {
         let first = 3 * (row * self.width + column) as usize;
         [self.rgb[first], self.rgb[first + 1], self.rgb[first + 2]]
+    }
+
+    /// Depths in whole millimetres, `[height, width]`; 0 where there is nothing, or it is farther than 65 m.
+    pub fn depth_mm(&self) -> Vec<u16> {
+        let millimetres = |&depth_m: &f32| (1000.0 * depth_m).round();
+        let whole = |depth: f32| if depth <= f32::from(u16::MAX) { depth as u16 } else { 0 };
+        self.depth_m.iter().map(millimetres).map(whole).collect()
     }
 
     /// Whether any pixel shows a body.

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::artifact::write;
-use crate::render::CameraConfig;
+use crate::render::{CameraConfig, Channel};
 use crate::trace::{Episode, Frame};
+use crate::video::png::{encode_grey_8, encode_grey_16};
 use crate::video::{Film, H264Encoder, Mp4Writer, Rgb, VideoError, encode_gif, encode_png};
 
 const NANOS_PER_SEC: u64 = 1_000_000_000;
@@ -62,16 +63,31 @@ pub fn write_gif(path: &Path, episode: &Episode, camera: &CameraConfig, fps: u32
     Ok(frames_at_rate(episode, fps).count() as u64)
 }
 
-/// Writes a picture of one recorded frame.
+/// Writes a picture of one recorded frame: its colours, depths (16 bits of grey, in millimetres, 0 for nothing) or
+/// segments (8 bits of grey, [`crate::render::Segment::number`]).
 ///
 /// # Errors
 ///
 /// As [`write_mp4`].
-pub fn write_png(path: &Path, episode: &Episode, camera: &CameraConfig, frame: &Frame) -> Result<(), VideoError> {
+pub fn write_png(
+    path: &Path,
+    episode: &Episode,
+    camera: &CameraConfig,
+    frame: &Frame,
+    channel: Channel,
+) -> Result<(), VideoError> {
     let mut film = Film::new(camera);
     film.begin_episode(episode)?;
     let picture = film.draw(&episode.scene, &frame.state);
+    let size_px = [picture.width, picture.height];
     let mut png = Vec::new();
-    encode_png(&picture.rgb, [picture.width, picture.height], &mut png)?;
+    match channel {
+        Channel::Color => encode_png(&picture.rgb, size_px, &mut png)?,
+        Channel::Depth => png = encode_grey_16(&picture.depth_mm(), size_px)?,
+        Channel::Segments => {
+            let numbers: Vec<u8> = picture.segments.iter().map(|&number| number.min(255) as u8).collect();
+            png = encode_grey_8(&numbers, size_px)?;
+        }
+    }
     Ok(write(path, &png)?)
 }

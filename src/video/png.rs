@@ -32,6 +32,37 @@ pub fn encode_png(rgb: &[u8], [width, height]: [u32; 2], png: &mut Vec<u8>) -> R
     written.map_err(|error| VideoError::codec("encode", "PNG")(&error))
 }
 
+/// Grey of 8 bits.
+///
+/// # Errors
+///
+/// When the values are not as many as the size says.
+pub(super) fn encode_grey_8(values: &[u8], size_px: [u32; 2]) -> Result<Vec<u8>, VideoError> {
+    encode_grey(values, size_px, ExtendedColorType::L8)
+}
+
+/// Grey of 16 bits.
+///
+/// # Errors
+///
+/// As [`encode_grey_8`].
+pub(super) fn encode_grey_16(values: &[u16], size_px: [u32; 2]) -> Result<Vec<u8>, VideoError> {
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    encode_grey(&bytes, size_px, ExtendedColorType::L16)
+}
+
+fn encode_grey(bytes: &[u8], [width, height]: [u32; 2], color: ExtendedColorType) -> Result<Vec<u8>, VideoError> {
+    let failed = VideoError::codec("encode", "PNG");
+    let expected = u64::from(width) * u64::from(height) * u64::from(color.bits_per_pixel() / 8);
+    if bytes.len() as u64 != expected {
+        return Err(failed(&format!("{} bytes for {width}x{height} pixels of {color:?}", bytes.len())));
+    }
+    let mut png = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Up);
+    encoder.write_image(bytes, width, height, color).map_err(|error| failed(&error))?;
+    Ok(png)
+}
+
 /// A picture from PNG.
 ///
 /// # Errors

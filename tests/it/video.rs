@@ -1,6 +1,6 @@
 //! Pictures come back from PNG, H.264 and MP4, and what is damaged is named.
 
-use ntp::render::{CameraConfig, PictureFormat, Viewpoint};
+use ntp::render::{CameraConfig, Channel, PictureFormat, Segment, Viewpoint};
 use ntp::task::Split;
 use ntp::trace::Episode;
 use ntp::video::{
@@ -137,6 +137,34 @@ fn clips_are_written_in_each_form() {
     assert_eq!(Mp4Reader::open(&mp4).unwrap().samples().len() as u64, n_pictures);
     assert_eq!(write_gif(&gif, &episode, &camera, 4).unwrap(), n_pictures);
     assert!(std::fs::read(&gif).unwrap().starts_with(b"GIF89a"));
-    write_png(&png, &episode, &camera, &episode.frames[0]).unwrap();
+    write_png(&png, &episode, &camera, &episode.frames[0], Channel::Color).unwrap();
     assert_eq!(decode_png(&std::fs::read(&png).unwrap()).unwrap().size_px, SIZE);
+}
+
+#[test]
+fn a_picture_of_depths_is_in_millimetres_and_one_of_segments_in_their_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let episode = episode();
+    let camera = CameraConfig::new(Viewpoint::Front, SIZE);
+    let frame = &episode.frames[0];
+    let mut film = Film::new(&camera);
+    film.begin_episode(&episode).unwrap();
+    let drawn = film.draw(&episode.scene, &frame.state);
+    let read = |channel| {
+        let path = folder.path().join("grey.png");
+        write_png(&path, &episode, &camera, frame, channel).unwrap();
+        image::open(&path).unwrap()
+    };
+    let (depths, segments) = (read(Channel::Depth).into_luma16(), read(Channel::Segments).into_luma8());
+    assert_eq!(<[u32; 2]>::from(depths.dimensions()), SIZE);
+    let of_pixel = |&(column, row): &(u32, u32)| {
+        let depth_m = drawn.depth_at_m(column, row);
+        let depth_mm = if depth_m.is_finite() { (1000.0 * depth_m).round() as u16 } else { 0 };
+        (depth_mm, drawn.segment(column, row).number() as u8)
+    };
+    let pixels: Vec<(u32, u32)> = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row))).collect();
+    let found = |&(column, row): &(u32, u32)| (depths.get_pixel(column, row)[0], segments.get_pixel(column, row)[0]);
+    assert!(pixels.iter().all(|pixel| found(pixel) == of_pixel(pixel)));
+    let table = u8::try_from(Segment::Table.number()).unwrap();
+    assert!(pixels.iter().map(of_pixel).any(|(depth_mm, segment)| segment == table && depth_mm > 500));
 }
