@@ -174,6 +174,18 @@ impl PicturesBeingRead {
         n_frames: usize,
         is_kept: bool,
     ) -> Result<(), MessageProblem> {
+        let taken = self.take(camera, topic, data, n_frames, is_kept);
+        taken.map_err(|problem| problem.of_camera(camera))
+    }
+
+    fn take(
+        &mut self,
+        camera: &str,
+        topic: CameraTopic,
+        data: &[u8],
+        n_frames: usize,
+        is_kept: bool,
+    ) -> Result<(), MessageProblem> {
         let format = match topic {
             CameraTopic::Transform => return Ok(()),
             CameraTopic::Calibration => {
@@ -213,12 +225,20 @@ impl PicturesBeingRead {
     /// The pictures of the episode, which has so many frames.
     pub(super) fn finish(self, n_frames: usize) -> Result<Vec<CameraPictures>, MessageProblem> {
         for reading in &self.cameras {
-            expect("number of pictures", reading.seen, n_frames)?;
-            if reading.pictures.size_px.contains(&0) {
-                return Err(MessageProblem::Missing { field: "calibration of a camera" });
-            }
+            reading.check(n_frames).map_err(|problem| problem.of_camera(&reading.pictures.camera))?;
         }
         Ok(self.cameras.into_iter().map(|reading| reading.pictures).collect())
+    }
+}
+
+impl Reading {
+    /// Whether there is a picture of each frame, and a calibration.
+    fn check(&self, n_frames: usize) -> Result<(), MessageProblem> {
+        expect("number of pictures", self.seen, n_frames)?;
+        if self.pictures.size_px.contains(&0) {
+            return Err(MessageProblem::Missing { field: "calibration" });
+        }
+        Ok(())
     }
 }
 

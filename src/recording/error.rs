@@ -84,12 +84,12 @@ pub enum RecordingError {
         expected: &'static str,
     },
     /// A message that cannot be what it should be.
-    #[error("episode {episode}: message {sequence} of {topic} at {log_time_nanos} ns: {problem}: {}", path.display())]
+    #[error("episode {episode} of the file: message {sequence} of {topic} at {log_time_nanos} ns: {problem}: {}", path.display())]
     Message {
         /// Which file.
         path: PathBuf,
         /// Which topic.
-        topic: &'static str,
+        topic: String,
         /// Position of the episode that is being read.
         episode: u64,
         /// The message's number in its topic.
@@ -100,7 +100,7 @@ pub enum RecordingError {
         problem: MessageProblem,
     },
     /// The messages end before the episode does.
-    #[error("episode {episode} has a start but no end: {}", path.display())]
+    #[error("episode {episode} of the file has a start but no end: {}", path.display())]
     Unfinished {
         /// Which file.
         path: PathBuf,
@@ -108,7 +108,7 @@ pub enum RecordingError {
         episode: u64,
     },
     /// The messages are well formed, but together they are no episode.
-    #[error("episode {episode}: {source}: {}", path.display())]
+    #[error("episode {episode} of the file: {source}: {}", path.display())]
     Trace {
         /// Which file.
         path: PathBuf,
@@ -253,9 +253,24 @@ pub enum MessageProblem {
         /// As it must be.
         expected: u64,
     },
+    /// Of what a camera saw.
+    #[error("camera {camera}: {problem}")]
+    Camera {
+        /// The camera's name.
+        camera: String,
+        /// What is wrong with it.
+        problem: Box<MessageProblem>,
+    },
     /// A message where none of its kind may be.
     #[error("out of place: {0}")]
     OutOfPlace(&'static str),
+}
+
+impl MessageProblem {
+    /// As one of a camera's.
+    pub(super) fn of_camera(self, camera: &str) -> Self {
+        Self::Camera { camera: camera.to_owned(), problem: Box::new(self) }
+    }
 }
 
 /// Why an episode cannot be written.

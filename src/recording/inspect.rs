@@ -92,7 +92,7 @@ pub fn inspect(path: &Path) -> Result<RecordingInspection, RecordingError> {
         };
         counted.map_err(|error| RecordingError::Message {
             path: path.to_owned(),
-            topic: topic.map_or("", Topic::name),
+            topic: topic.map_or("", Topic::name).to_owned(),
             episode: found.episodes,
             sequence,
             log_time_nanos,

@@ -209,18 +209,21 @@ fn take(
         offset,
         source,
     })?;
-    let (topic, taken) = match topic {
-        Some(topic) => (topic.name(), assembler.message(topic, log_time_nanos, data)),
+    let taken = match topic {
+        Some(topic) => {
+            assembler.message(topic, log_time_nanos, data).map_err(|problem| (topic.name().to_owned(), problem))
+        }
         None => {
             let camera = index.camera_topic(channel).filter(|_| assembler.wants_pictures());
             let Some((camera, topic)) = camera else { return Ok(ControlFlow::Continue(())) };
-            ("/camera", assembler.camera_message(camera, topic, data).map(|()| None))
+            let taken = assembler.camera_message(camera, topic, data);
+            taken.map(|()| None).map_err(|problem| (topic.name(camera), problem))
         }
     };
     match taken {
         Ok(Some(assembled)) => Ok(ControlFlow::Break(assembled)),
         Ok(None) => Ok(ControlFlow::Continue(())),
-        Err(problem) => {
+        Err((topic, problem)) => {
             let path = path.to_owned();
             Err(RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem })
         }

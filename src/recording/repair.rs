@@ -197,7 +197,7 @@ impl Salvage {
         };
         let Some(topic) = Topic::read().find(is_topic) else { return Ok(()) };
         let assembled = self.assembler.message(topic, log_time_nanos, data).map_err(|problem| {
-            let (path, topic, episode) = (self.path.clone(), topic.name(), self.n_kept);
+            let (path, topic, episode) = (self.path.clone(), topic.name().to_owned(), self.n_kept);
             RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem }
         })?;
         assembled.map_or(Ok(()), |assembled| self.keep(assembled))

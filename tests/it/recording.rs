@@ -1,5 +1,6 @@
 //! Episodes to MCAP and back: nothing lost, nothing read that is not right.
 
+mod camera_faults;
 mod cameras;
 mod container;
 mod faults;

@@ -11,7 +11,7 @@ use ntp::video::{H264Decoder, Rgb, decode_png};
 
 use crate::kinematic::{demonstration, tower, trial};
 
-fn cameras() -> [CameraConfig; 2] {
+pub(super) fn cameras() -> [CameraConfig; 2] {
     let front = CameraConfig::new(Viewpoint::Front, [64, 64]);
     let wrist = CameraConfig { format: PictureFormat::H264, ..CameraConfig::new(Viewpoint::Wrist, [48, 32]) };
     [front, wrist]
@@ -22,7 +22,7 @@ fn episodes() -> Vec<Episode> {
     (0..2).map(|index| demonstration(&task, &trial(&task, index, 1), u64::from(index))).collect()
 }
 
-fn write(path: &Path) -> Vec<Episode> {
+pub(super) fn write(path: &Path) -> Vec<Episode> {
     let episodes = episodes();
     let mut writer = ShardWriter::create(path, "{}").unwrap().with_cameras(&cameras());
     episodes.iter().for_each(|episode| writer.write(episode).unwrap());
