@@ -35,7 +35,6 @@ mod verify;
 
 pub use demonstration::demonstration_of;
 pub use error::PipelineError;
-pub use eye::cameras_of;
 pub use layout::RunDir;
 pub use resolve::Pipeline;
 pub use runner::{Options, StageReport, Status, run, run_study};

@@ -11,7 +11,7 @@ use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::{Playback, play_back};
 use crate::pipeline::{self, Verification};
-use crate::recording::ShardReader;
+use crate::recording::{self, ShardReader};
 use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
 use crate::scene::BodyIndex;
@@ -181,7 +181,7 @@ pub(super) fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
             }
             let plan: Plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
-            let (episode, cameras) = (reader.read_episode(number - n_episodes)?, pipeline::cameras_of(&plan));
+            let (episode, cameras) = (reader.read_episode(number - n_episodes)?, recording::cameras_of(&plan));
             let (file, demonstration, divergence) = (file.clone(), None, None);
             found.push(Found { number, file, plan, episode, demonstration, divergence, cameras });
         }

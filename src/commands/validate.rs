@@ -8,10 +8,14 @@ use crate::artifact::StageDir;
 use crate::cli::PathArgs;
 use crate::commands::kind::{self, Kind};
 use crate::commands::{CommandOutcome, output, replay};
-use crate::recording::ShardReader;
+use crate::recording::{RecordingError, ShardReader};
 use crate::rollout::RolloutRows;
 use crate::task::TaskSet;
+use crate::trace::Episode;
 use crate::{dataset, model};
+
+/// How many findings of an artifact's recordings are told; the others are counted.
+const MOST_TOLD: usize = 100;
 
 /// Something that is not as it should be.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -79,15 +83,16 @@ fn check(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result
     let before = validation.findings.len();
     check_manifest(path, kind, validation);
     let held = match kind {
-        Kind::Recording => check_recording(path).map(|episodes| format!("{episodes} episodes")),
-        Kind::Recordings => check_recordings(path),
+        Kind::Recording => check_recordings(path, kind, validation).map(|(_, episodes)| format!("{episodes} episodes")),
+        Kind::Recordings => check_recordings(path, kind, validation)
+            .map(|(files, episodes)| format!("{files} files, {episodes} episodes")),
         Kind::Tasks => check_tasks(path),
         Kind::Dataset => {
             check_dataset(path, validation);
             return Ok(());
         }
         Kind::Model => model::inspect(path).map(|found| format!("{} parameters", found.parameters)).map_err(Into::into),
-        Kind::Rollouts => check_rollouts(path),
+        Kind::Rollouts => check_rollouts(path, validation),
         Kind::Report | Kind::Run | Kind::Study => Ok("report".to_owned()),
     };
     match held {
@@ -127,22 +132,37 @@ fn check_manifest(path: &Path, kind: Kind, validation: &mut Validation) {
     }
 }
 
-fn check_recording(path: &Path) -> anyhow::Result<u64> {
-    let mut episodes = 0;
-    for episode in ShardReader::open(path)? {
-        episode?;
-        episodes += 1;
+/// The recordings at a path: how many files there are, and episodes that are as they should be.
+fn check_recordings(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result<(usize, u64)> {
+    let files = replay::recordings(path)?;
+    let (mut episodes, mut n_wrong) = (0, 0);
+    for file in &files {
+        for checked in check_recording(file) {
+            let Err(error) = checked else {
+                episodes += 1;
+                continue;
+            };
+            n_wrong += 1;
+            if n_wrong <= MOST_TOLD {
+                let (code, path, message) = (content_code(kind), file.clone(), error.to_string());
+                validation.findings.push(Finding { code, path, message });
+            }
+        }
     }
-    Ok(episodes)
+    if n_wrong > MOST_TOLD {
+        let message = format!("{} more findings", n_wrong - MOST_TOLD);
+        validation.findings.push(Finding { code: content_code(kind), path: path.to_owned(), message });
+    }
+    Ok((files.len(), episodes))
 }
 
-fn check_recordings(path: &Path) -> anyhow::Result<String> {
-    let files = replay::recordings(path)?;
-    let mut episodes = 0;
-    for file in &files {
-        episodes += check_recording(file)?;
-    }
-    Ok(format!("{} files, {episodes} episodes", files.len()))
+/// Each episode of a file with what cameras saw, or what is wrong.
+fn check_recording(file: &Path) -> impl Iterator<Item = Result<Episode, RecordingError>> {
+    let (episodes, error) = match ShardReader::open(file) {
+        Ok(reader) => (Some(reader.checked()), None),
+        Err(error) => (None, Some(Err(error))),
+    };
+    episodes.into_iter().flatten().chain(error)
 }
 
 fn check_tasks(path: &Path) -> anyhow::Result<String> {
@@ -151,10 +171,10 @@ fn check_tasks(path: &Path) -> anyhow::Result<String> {
     Ok(format!("{} tasks, no unseen goal among the seen", tasks.tasks.len()))
 }
 
-fn check_rollouts(path: &Path) -> anyhow::Result<String> {
+fn check_rollouts(path: &Path, validation: &mut Validation) -> anyhow::Result<String> {
     let rows = RolloutRows::read(&path.join("rollouts.parquet"))?;
     if path.join("recordings").is_dir() {
-        check_recordings(&path.join("recordings"))?;
+        check_recordings(&path.join("recordings"), Kind::Rollouts, validation)?;
     }
     let (episodes, successes) = rows.successes();
     Ok(format!("{episodes} episodes, {successes} succeeded"))

@@ -1,6 +1,5 @@
 //! What models that see look with: the cameras that film the demonstrations.
 
-use crate::artifact::Plan;
 use crate::model::Pictures;
 use crate::render::CameraConfig;
 use crate::rollout::{Eye, Sight};
@@ -19,13 +18,6 @@ impl Eye for CameraEye {
         seen.push(&self.0.draw(scene, &frame.state).rgb, frame.gripper());
         seen
     }
-}
-
-/// The cameras that filmed a recording's episodes, as its plan tells: the first is what a policy that sees looks with.
-/// None where there were none, or the plan is of another kind.
-pub fn cameras_of(plan: &Plan) -> Vec<CameraConfig> {
-    let cameras = plan.config.pointer("/generate/cameras").or_else(|| plan.config.get("cameras"));
-    cameras.and_then(|cameras| serde_json::from_value(cameras.clone()).ok()).unwrap_or_default()
 }
 
 /// A demonstration as a camera sees it, and the camera before a world of a scene and seed.

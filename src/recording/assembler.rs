@@ -2,7 +2,7 @@
 
 use prost::Message as _;
 
-use super::cameras::{CameraPictures, PicturesBeingRead};
+use super::cameras::{Filmed, PicturesBeingRead};
 use super::error::MessageProblem;
 use super::observation::Observed;
 use super::schema::{CameraTopic, Topic, proto};
@@ -26,15 +26,15 @@ pub(super) struct Assembled {
     pub(super) parts: EpisodeParts,
     pub(super) recorded: RecordedFrames,
     /// Of the kept frames; empty when they are not wanted.
-    pub(super) cameras: Vec<CameraPictures>,
+    pub(super) cameras: Vec<Filmed>,
 }
 
 /// Episodes being put together, one at a time. Its buffers are used again from message to message.
 #[derive(Default)]
 pub(super) struct Assembler {
     keep: Keep,
-    /// Whether pictures are wanted.
-    pictures: bool,
+    /// The cameras whose pictures each episode must have; `None` when none are wanted.
+    cameras: Option<Vec<String>>,
     building: Option<Box<Building>>,
     call: proto::ProgramCall,
     returned: proto::ProgramReturn,
@@ -69,14 +69,14 @@ impl Assembler {
         Self { keep, ..Self::default() }
     }
 
-    /// With the pictures of the frames that are kept.
-    pub(super) fn with_pictures(self) -> Self {
-        Self { pictures: true, ..self }
+    /// With the pictures of the frames that are kept, of these cameras and any others that there are.
+    pub(super) fn with_pictures(self, cameras: Vec<String>) -> Self {
+        Self { cameras: Some(cameras), ..self }
     }
 
     /// Whether pictures are wanted.
     pub(super) fn wants_pictures(&self) -> bool {
-        self.pictures
+        self.cameras.is_some()
     }
 
     /// Takes a message of a camera.
@@ -109,7 +109,7 @@ impl Assembler {
             if self.building.is_some() {
                 return Err(MessageProblem::OutOfPlace("the episode before has not ended"));
             }
-            self.building = Some(Box::new(Building::new(self.keep, log_time_nanos, data)?));
+            self.building = Some(Box::new(Building::new(self.keep, self.cameras.as_deref(), log_time_nanos, data)?));
             return Ok(None);
         }
         let Some(building) = &mut self.building else {
@@ -150,7 +150,7 @@ impl Assembler {
 }
 
 impl Building {
-    fn new(keep: Keep, start_nanos: u64, data: &[u8]) -> Result<Self, MessageProblem> {
+    fn new(keep: Keep, cameras: Option<&[String]>, start_nanos: u64, data: &[u8]) -> Result<Self, MessageProblem> {
         let start = start::decode(proto::EpisodeStart::decode(data)?)?;
         let n_bodies = start.scene.bodies.len();
         let state = SceneState {
@@ -174,7 +174,7 @@ impl Building {
             boundaries: Vec::new(),
             calls: Vec::new(),
             pushes: Vec::new(),
-            pictures: PicturesBeingRead::default(),
+            pictures: PicturesBeingRead::new(cameras.unwrap_or_default()),
         })
     }
 

@@ -11,6 +11,7 @@ use super::schema::foxglove::{
 };
 use super::schema::{CameraTopic, Timestamp, timestamp};
 use super::transform::{GRIPPER, WORLD};
+use crate::artifact::Plan;
 use crate::render::{CameraConfig, Mount, PictureFormat};
 use crate::trace::{Actor, Episode};
 use crate::video::{Film, VideoError};
@@ -37,34 +38,50 @@ pub struct Pictured<T> {
     pub cameras: Vec<CameraPictures>,
 }
 
+/// The cameras that filmed a recording's episodes, as its plan tells: the first is what a policy that sees looks with.
+/// None where there were none, or the plan is of another kind.
+pub fn cameras_of(plan: &Plan) -> Vec<CameraConfig> {
+    let cameras = plan.config.pointer("/generate/cameras").or_else(|| plan.config.get("cameras"));
+    cameras.and_then(|cameras| serde_json::from_value(cameras.clone()).ok()).unwrap_or_default()
+}
+
 /// The cameras of a recording that is being written.
 #[derive(Default)]
 pub(super) struct Cameras {
+    /// Name and format of each.
+    declared: Vec<(String, PictureFormat)>,
+    /// None where episodes come with what cameras saw.
     films: Vec<Film>,
 }
 
 /// What a camera filmed, with what it is and where.
+#[derive(Debug)]
 pub(super) struct Filmed {
-    pub(super) format: PictureFormat,
-    frame_id: String,
+    pub(super) seen: CameraPictures,
     calibration: CameraCalibration,
-    transform: FrameTransform,
-    pictures: Vec<Vec<u8>>,
+    transforms: FrameTransforms,
 }
 
 impl Cameras {
     pub(super) fn new(configs: &[CameraConfig]) -> Self {
-        Self { films: configs.iter().map(Film::new).collect() }
+        let declared = configs.iter().map(|config| (config.name.clone(), config.format));
+        Self { declared: declared.collect(), films: configs.iter().map(Film::new).collect() }
+    }
+
+    /// Those of an episode that was filmed before.
+    pub(super) fn of(filmed: &[Filmed]) -> Self {
+        Self { declared: filmed.iter().map(Filmed::declared).collect(), films: Vec::new() }
     }
 
     /// Name and format of each camera.
-    pub(super) fn configs(&self) -> impl Iterator<Item = &CameraConfig> {
-        self.films.iter().map(Film::config)
+    pub(super) fn declared(&self) -> &[(String, PictureFormat)] {
+        &self.declared
     }
 
-    /// How many there are.
-    pub(super) fn len(&self) -> usize {
-        self.films.len()
+    /// Whether an episode that was filmed before is of these cameras.
+    pub(super) fn check(&self, filmed: &[Filmed]) -> Result<(), EpisodeProblem> {
+        let are_same = filmed.iter().map(Filmed::declared).eq(self.declared.iter().cloned());
+        if are_same { Ok(()) } else { Err(EpisodeProblem::Cameras) }
     }
 
     /// Films all frames of an episode with each camera.
@@ -79,7 +96,7 @@ impl Cameras {
 
 fn filmed(film: &mut Film, episode: &Episode) -> Result<Filmed, VideoError> {
     film.begin_episode(episode)?;
-    let frame_id = frame_id(&film.config().name);
+    let frame_id = format!("camera_{}", film.config().name);
     let pictures = episode.frames.iter().map(|frame| {
         let picture = film.frame(&episode.scene, &frame.state, frame.boundary)?;
         Ok(picture.to_vec())
@@ -111,19 +128,20 @@ fn filmed(film: &mut Film, episode: &Episode) -> Result<Filmed, VideoError> {
     let transform = FrameTransform {
         timestamp: None,
         parent_frame_id: parent.to_owned(),
-        child_frame_id: frame_id.clone(),
+        child_frame_id: frame_id,
         translation: Some(Vector3 { x, y, z }),
         rotation: Some(Quaternion { x: i, y: j, z: k, w }),
     };
-    Ok(Filmed { format: film.config().format, frame_id, calibration, transform, pictures })
-}
-
-/// The frame of reference of a camera.
-fn frame_id(camera: &str) -> String {
-    format!("camera_{camera}")
+    let CameraConfig { name, format, .. } = film.config().clone();
+    let seen = CameraPictures { camera: name, size_px: [camera.width, camera.height], format, pictures };
+    Ok(Filmed { seen, calibration, transforms: FrameTransforms { transforms: vec![transform] } })
 }
 
 impl Filmed {
+    fn declared(&self) -> (String, PictureFormat) {
+        (self.seen.camera.clone(), self.seen.format)
+    }
+
     /// What the camera is, from now on.
     pub(super) fn calibration(&self, log_time_nanos: u64) -> Vec<u8> {
         let stamp = Some(timestamp(log_time_nanos));
@@ -132,15 +150,18 @@ impl Filmed {
 
     /// Where the camera is, from now on.
     pub(super) fn transform(&self, log_time_nanos: u64) -> Vec<u8> {
-        let transform = FrameTransform { timestamp: Some(timestamp(log_time_nanos)), ..self.transform.clone() };
-        FrameTransforms { transforms: vec![transform] }.encode_to_vec()
+        let stamp = Some(timestamp(log_time_nanos));
+        let transforms = self.transforms.transforms.iter().cloned();
+        let transforms = transforms.map(|transform| FrameTransform { timestamp: stamp, ..transform }).collect();
+        FrameTransforms { transforms }.encode_to_vec()
     }
 
     /// The picture of a frame.
     pub(super) fn picture(&mut self, log_time_nanos: u64, position: usize) -> Vec<u8> {
         let timestamp: Option<Timestamp> = Some(timestamp(log_time_nanos));
-        let (frame_id, data) = (self.frame_id.clone(), std::mem::take(&mut self.pictures[position]));
-        match self.format {
+        let frame_id = self.calibration.frame_id.clone();
+        let data = std::mem::take(&mut self.seen.pictures[position]);
+        match self.seen.format {
             PictureFormat::Png => {
                 CompressedImage { timestamp, frame_id, data, format: "png".to_owned() }.encode_to_vec()
             }
@@ -159,12 +180,17 @@ pub(super) struct PicturesBeingRead {
 
 #[derive(Debug)]
 struct Reading {
-    pictures: CameraPictures,
+    filmed: Filmed,
     /// Pictures seen, also those that were passed over.
-    seen: usize,
+    n_seen: usize,
 }
 
 impl PicturesBeingRead {
+    /// Of these cameras, and any other of which a message comes.
+    pub(super) fn new(cameras: &[String]) -> Self {
+        Self { cameras: cameras.iter().map(|camera| Reading::new(camera)).collect() }
+    }
+
     /// Takes a message of a camera; `n_frames` frames were read before it, the last of which is kept or passed over.
     pub(super) fn message(
         &mut self,
@@ -187,11 +213,15 @@ impl PicturesBeingRead {
         is_kept: bool,
     ) -> Result<(), MessageProblem> {
         let format = match topic {
-            CameraTopic::Transform => return Ok(()),
+            CameraTopic::Transform => {
+                self.reading(camera).filmed.transforms = FrameTransforms::decode(data)?;
+                return Ok(());
+            }
             CameraTopic::Calibration => {
                 let calibration = CameraCalibration::decode(data)?;
-                let reading = self.reading(camera);
-                reading.pictures.size_px = [calibration.width, calibration.height];
+                let filmed = &mut self.reading(camera).filmed;
+                filmed.seen.size_px = [calibration.width, calibration.height];
+                filmed.calibration = calibration;
                 return Ok(());
             }
             CameraTopic::Image => PictureFormat::Png,
@@ -202,40 +232,45 @@ impl PicturesBeingRead {
             PictureFormat::H264 => CompressedVideo::decode(data)?.data,
         };
         let reading = self.reading(camera);
-        reading.seen += 1;
-        expect("number of pictures", reading.seen, n_frames)?;
-        reading.pictures.format = format;
+        reading.n_seen += 1;
+        expect("number of pictures", reading.n_seen, n_frames)?;
+        reading.filmed.seen.format = format;
         if is_kept {
-            reading.pictures.pictures.push(picture);
+            reading.filmed.seen.pictures.push(picture);
         }
         Ok(())
     }
 
     fn reading(&mut self, camera: &str) -> &mut Reading {
-        let position = self.cameras.iter().position(|reading| reading.pictures.camera == camera);
+        let position = self.cameras.iter().position(|reading| reading.filmed.seen.camera == camera);
         let position = position.unwrap_or_else(|| {
-            let (camera, format) = (camera.to_owned(), PictureFormat::default());
-            let pictures = CameraPictures { camera, size_px: [0; 2], format, pictures: Vec::new() };
-            self.cameras.push(Reading { pictures, seen: 0 });
+            self.cameras.push(Reading::new(camera));
             self.cameras.len() - 1
         });
         &mut self.cameras[position]
     }
 
     /// The pictures of the episode, which has so many frames.
-    pub(super) fn finish(self, n_frames: usize) -> Result<Vec<CameraPictures>, MessageProblem> {
+    pub(super) fn finish(self, n_frames: usize) -> Result<Vec<Filmed>, MessageProblem> {
         for reading in &self.cameras {
-            reading.check(n_frames).map_err(|problem| problem.of_camera(&reading.pictures.camera))?;
+            reading.check(n_frames).map_err(|problem| problem.of_camera(&reading.filmed.seen.camera))?;
         }
-        Ok(self.cameras.into_iter().map(|reading| reading.pictures).collect())
+        Ok(self.cameras.into_iter().map(|reading| reading.filmed).collect())
     }
 }
 
 impl Reading {
+    fn new(camera: &str) -> Self {
+        let (camera, format) = (camera.to_owned(), PictureFormat::default());
+        let seen = CameraPictures { camera, size_px: [0; 2], format, pictures: Vec::new() };
+        let (calibration, transforms) = (CameraCalibration::default(), FrameTransforms::default());
+        Self { filmed: Filmed { seen, calibration, transforms }, n_seen: 0 }
+    }
+
     /// Whether there is a picture of each frame, and a calibration.
     fn check(&self, n_frames: usize) -> Result<(), MessageProblem> {
-        expect("number of pictures", self.seen, n_frames)?;
-        if self.pictures.size_px.contains(&0) {
+        expect("number of pictures", self.n_seen, n_frames)?;
+        if self.filmed.seen.size_px.contains(&0) {
             return Err(MessageProblem::Missing { field: "calibration" });
         }
         Ok(())

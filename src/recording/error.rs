@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::artifact::IoError;
 use crate::trace::TraceError;
+use crate::video::VideoError;
 
 /// A recording could not be written or read. Positions of episodes count from 0 in their file.
 #[derive(Debug, thiserror::Error)]
@@ -116,6 +117,20 @@ pub enum RecordingError {
         episode: u64,
         /// The rule that does not hold.
         source: TraceError,
+    },
+    /// A picture that cannot be decoded, or has another size than its camera.
+    #[error("episode {episode} of the file, camera {camera}: picture of frame {frame}: {source}: {}", path.display())]
+    Picture {
+        /// Which file.
+        path: PathBuf,
+        /// Position of the episode.
+        episode: u64,
+        /// The camera's name.
+        camera: String,
+        /// Position of the frame in its episode.
+        frame: usize,
+        /// Why.
+        source: VideoError,
     },
     /// An episode that the file does not have is asked for.
     #[error("no episode {position}, there are {episodes}: {}", path.display())]
@@ -304,6 +319,9 @@ pub enum EpisodeProblem {
         /// Why.
         message: String,
     },
+    /// All episodes of a file are seen by the same cameras.
+    #[error("its cameras, or how they store pictures, are not those of the file's others")]
+    Cameras,
     /// Its times do not fit 64 bits of nanoseconds.
     #[error("its times overflow")]
     TimeOverflow,

@@ -24,6 +24,13 @@ pub(super) struct Channel {
     pub(super) encoding: String,
 }
 
+impl Channel {
+    /// The camera and the topic, if it is a camera's.
+    pub(super) fn camera_topic(&self) -> Option<(&str, CameraTopic)> {
+        CameraTopic::from_name(&self.topic).filter(|(_, topic)| topic.message() == self.schema)
+    }
+}
+
 /// The index of a recording of ours.
 pub(super) struct Index {
     pub(super) statistics: Statistics,
@@ -106,8 +113,18 @@ impl Index {
 
     /// The camera and the topic of a channel, if it is a camera's.
     pub(super) fn camera_topic(&self, channel: u16) -> Option<(&str, CameraTopic)> {
-        let channel = self.channels.get(&channel)?;
-        CameraTopic::from_name(&channel.topic).filter(|(_, topic)| topic.message() == channel.schema)
+        self.channels.get(&channel)?.camera_topic()
+    }
+
+    /// The cameras that have a topic, in the order of their channels.
+    pub(super) fn cameras(&self) -> Vec<String> {
+        let mut cameras: Vec<String> = Vec::new();
+        for (camera, _topic) in self.channels.keys().filter_map(|&channel| self.camera_topic(channel)) {
+            if !cameras.iter().any(|known| known == camera) {
+                cameras.push(camera.to_owned());
+            }
+        }
+        cameras
     }
 
     /// How many episodes there are.

@@ -5,11 +5,13 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::assembler::{Assembled, Assembler, Keep};
-use super::cameras::Pictured;
+use super::cameras::{CameraPictures, Filmed, Pictured, cameras_of};
+use super::decode::check_pictures;
 use super::error::RecordingError;
 use super::index::Index;
 use super::stream::{RawMessage, Stream};
-use crate::artifact::IoError;
+use crate::artifact::{IoError, Plan};
+use crate::render::CameraConfig;
 use crate::task::Family;
 use crate::trace::{Boundaries, Episode, TraceError};
 
@@ -75,7 +77,29 @@ impl ShardReader {
     /// Reads also what cameras saw, from the next episode on.
     #[must_use]
     pub fn pictured(self) -> PicturedReader {
-        PicturedReader(Self { assembler: self.assembler.with_pictures(), ..self })
+        let assembler = self.assembler.with_pictures(self.index.cameras());
+        PicturedReader(Self { assembler, ..self })
+    }
+
+    /// Checks also what cameras saw, from the next episode on, where there are cameras.
+    #[must_use]
+    pub fn checked(self) -> CheckedReader {
+        let cameras = self.cameras();
+        let assembler = if cameras.is_empty() { self.assembler } else { self.assembler.with_pictures(cameras) };
+        CheckedReader(Self { assembler, ..self })
+    }
+
+    /// The cameras that the file declares, then those that its plan names beside them.
+    pub(super) fn cameras(&self) -> Vec<String> {
+        let mut cameras = self.index.cameras();
+        // The plan of a test, or of another program, is none of ours.
+        let plan = serde_json::from_str::<Plan>(self.plan_json()).ok();
+        for CameraConfig { name, .. } in plan.as_ref().map(cameras_of).unwrap_or_default() {
+            if !cameras.contains(&name) {
+                cameras.push(name);
+            }
+        }
+        cameras
     }
 
     /// One episode, by its position in the file from 0. Iteration is not disturbed.
@@ -163,7 +187,8 @@ impl BoundaryReader {
     #[must_use]
     pub fn pictured(self) -> PicturedBoundaryReader {
         let Self(reader) = self;
-        PicturedBoundaryReader(ShardReader { assembler: reader.assembler.with_pictures(), ..reader })
+        let assembler = reader.assembler.with_pictures(reader.index.cameras());
+        PicturedBoundaryReader(ShardReader { assembler, ..reader })
     }
 }
 
@@ -174,7 +199,9 @@ impl Iterator for PicturedReader {
     type Item = Result<Pictured<Episode>, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.0.next_checked(|Assembled { parts, cameras, .. }| Ok(Pictured { episode: Episode::new(parts)?, cameras }))
+        self.0.next_checked(|Assembled { parts, cameras, .. }| {
+            Ok(Pictured { episode: Episode::new(parts)?, cameras: pictures(cameras) })
+        })
     }
 }
 
@@ -186,9 +213,32 @@ impl Iterator for PicturedBoundaryReader {
 
     fn next(&mut self) -> Option<Self::Item> {
         self.0.next_checked(|Assembled { parts, recorded, cameras }| {
-            Ok(Pictured { episode: Boundaries::new(parts, recorded)?, cameras })
+            Ok(Pictured { episode: Boundaries::new(parts, recorded)?, cameras: pictures(cameras) })
         })
     }
+}
+
+/// A recording that is checked: each episode has what every camera of the file and of its plan saw, and each picture
+/// can be decoded and has its camera's size. Pictures that cannot be decoded are an error in place of their episode,
+/// which does not end the iteration; any other error does.
+pub struct CheckedReader(ShardReader);
+
+impl Iterator for CheckedReader {
+    type Item = Result<Episode, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let Self(reader) = self;
+        let position = reader.position;
+        let next = reader.next_checked(|Assembled { parts, cameras, .. }| Ok((Episode::new(parts)?, cameras)))?;
+        Some(next.and_then(|(episode, cameras)| {
+            check_pictures(&reader.path, position, &cameras)?;
+            Ok(episode)
+        }))
+    }
+}
+
+fn pictures(cameras: Vec<Filmed>) -> Vec<CameraPictures> {
+    cameras.into_iter().map(|filmed| filmed.seen).collect()
 }
 
 fn open(path: &Path) -> Result<File, RecordingError> {

@@ -1,7 +1,7 @@
 //! What can be verified of a recording that is cut off or damaged.
 //!
 //! The file is read from its beginning, without its index. Episodes are kept until the first checksum, message or rule
-//! that is wrong; nothing behind it is looked at.
+//! or picture that is wrong; nothing behind it is looked at. What cameras saw is kept as it is.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::assembler::{Assembled, Assembler};
 use super::container::Fields;
+use super::decode::check_pictures;
 use super::error::{Damage, RecordingError};
 use super::index::{Channel, check_metadata, parse_metadata, parse_plan};
 use super::reader::ShardReader;
@@ -69,7 +70,7 @@ pub fn repair(path: &Path, to: &Path) -> Result<RecordingRepair, RecordingError>
 fn check(path: &Path) -> (u64, Option<RecordingError>) {
     let mut n_episodes = 0;
     let mut read = || -> Result<(), RecordingError> {
-        for episode in ShardReader::open(path)? {
+        for episode in ShardReader::open(path)?.checked() {
             episode?;
             n_episodes += 1;
         }
@@ -106,10 +107,12 @@ struct Salvage {
 
 impl Salvage {
     fn new(path: &Path, to: &Path) -> Result<Self, RecordingError> {
+        // Without an index, the cameras are those that are met.
+        let cameras = ShardReader::open(path).map(|reader| reader.cameras()).unwrap_or_default();
         Ok(Self {
             path: path.to_owned(),
             writer: ShardWriter::create(to, "{}")?,
-            assembler: Assembler::default(),
+            assembler: Assembler::default().with_pictures(cameras),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             has_metadata: false,
@@ -195,9 +198,14 @@ impl Salvage {
             let names = (declared.topic.as_str(), declared.schema.as_str(), declared.encoding.as_str());
             names == (topic.name(), topic.message(), "protobuf")
         };
-        let Some(topic) = Topic::read().find(is_topic) else { return Ok(()) };
-        let assembled = self.assembler.message(topic, log_time_nanos, data).map_err(|problem| {
-            let (path, topic, episode) = (self.path.clone(), topic.name().to_owned(), self.n_kept);
+        let assembler = &mut self.assembler;
+        let taken = match (Topic::read().find(is_topic), declared.camera_topic()) {
+            (Some(topic), _) => assembler.message(topic, log_time_nanos, data),
+            (None, Some((camera, topic))) => assembler.camera_message(camera, topic, data).map(|()| None),
+            (None, None) => return Ok(()),
+        };
+        let assembled = taken.map_err(|problem| {
+            let (path, topic, episode) = (self.path.clone(), declared.topic.clone(), self.n_kept);
             RecordingError::Message { path, topic, episode, sequence, log_time_nanos, problem }
         })?;
         assembled.map_or(Ok(()), |assembled| self.keep(assembled))
@@ -206,8 +214,10 @@ impl Salvage {
     fn keep(&mut self, assembled: Assembled) -> Result<(), RecordingError> {
         let (path, episode) = (&self.path, self.n_kept);
         let of_trace = |source| RecordingError::Trace { path: path.clone(), episode, source };
-        let episode = Episode::new(assembled.parts).map_err(of_trace)?;
-        self.writer.write(&episode)?;
+        let Assembled { parts, cameras, .. } = assembled;
+        let whole = Episode::new(parts).map_err(of_trace)?;
+        check_pictures(path, episode, &cameras)?;
+        self.writer.write_filmed(&whole, cameras)?;
         self.n_kept += 1;
         Ok(())
     }

@@ -104,9 +104,14 @@ impl ShardWriter {
     /// Films every episode with these cameras. To be said before the first one is written.
     #[must_use]
     pub fn with_cameras(mut self, cameras: &[CameraConfig]) -> Self {
-        self.cameras = Cameras::new(cameras);
-        self.sink.sequences.resize(Topic::ALL.len() + TOPICS_PER_CAMERA * self.cameras.len(), 0);
+        self.set_cameras(Cameras::new(cameras));
         self
+    }
+
+    fn set_cameras(&mut self, cameras: Cameras) {
+        let n_topics = Topic::ALL.len() + TOPICS_PER_CAMERA * cameras.declared().len();
+        self.sink.sequences.resize(n_topics, 0);
+        self.cameras = cameras;
     }
 
     /// Writes one episode behind those before.
@@ -116,9 +121,29 @@ impl ShardWriter {
     /// [`RecordingError::Unrecordable`] when it cannot be told in the file's terms; the shard is as before then, and
     /// others can still be written. [`RecordingError::Io`] when the disk is full; the shard is of no use then.
     pub fn write(&mut self, episode: &Episode) -> Result<(), RecordingError> {
+        self.write_with(episode, |cameras| cameras.film(episode))
+    }
+
+    /// Writes one episode with what cameras saw of it, those of the first episode.
+    ///
+    /// # Errors
+    ///
+    /// As [`ShardWriter::write`].
+    pub(super) fn write_filmed(&mut self, episode: &Episode, filmed: Vec<Filmed>) -> Result<(), RecordingError> {
+        if self.family.is_none() {
+            self.set_cameras(Cameras::of(&filmed));
+        }
+        self.write_with(episode, |cameras| cameras.check(&filmed).map(|()| filmed))
+    }
+
+    fn write_with(
+        &mut self,
+        episode: &Episode,
+        film: impl FnOnce(&mut Cameras) -> Result<Vec<Filmed>, EpisodeProblem>,
+    ) -> Result<(), RecordingError> {
         let times = self.check(episode).map_err(|problem| self.unrecordable(episode, problem))?;
         let steps = calls::steps(&episode.calls).map_err(|problem| self.unrecordable(episode, problem))?;
-        let filmed = self.cameras.film(episode).map_err(|problem| self.unrecordable(episode, problem))?;
+        let filmed = film(&mut self.cameras).map_err(|problem| self.unrecordable(episode, problem))?;
         if self.family.is_none() {
             self.family = Some(episode.provenance.family);
             self.declare()?;
@@ -215,12 +240,12 @@ impl Sink {
             let id = channel_id(topic);
             self.mcap.add_channel_with_id(id, schema, topic.name(), "protobuf", &BTreeMap::new())?;
         }
-        for (number, camera) in cameras.configs().enumerate() {
-            let pictures = CameraTopic::pictures(camera.format);
+        for (number, (camera, format)) in cameras.declared().iter().enumerate() {
+            let pictures = CameraTopic::pictures(*format);
             for (kind, topic) in [CameraTopic::Calibration, CameraTopic::Transform, pictures].into_iter().enumerate() {
                 let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
                 let id = camera_channel(number, kind) as u16 + 1;
-                self.mcap.add_channel_with_id(id, schema, &topic.name(&camera.name), "protobuf", &BTreeMap::new())?;
+                self.mcap.add_channel_with_id(id, schema, &topic.name(camera), "protobuf", &BTreeMap::new())?;
             }
         }
         Ok(())

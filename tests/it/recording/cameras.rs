@@ -17,7 +17,7 @@ pub(super) fn cameras() -> [CameraConfig; 2] {
     [front, wrist]
 }
 
-fn episodes() -> Vec<Episode> {
+pub(super) fn episodes() -> Vec<Episode> {
     let task = tower("three", &[1, 3, 5], Split::Seen);
     (0..2).map(|index| demonstration(&task, &trial(&task, index, 1), u64::from(index))).collect()
 }
