@@ -10,7 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use crate::artifact::IoError;
-use crate::dataset::pictures::shelf::{Decoded, Shelf, Wanted};
+use crate::dataset::pictures::shelf::{Decoded, Found, Shelf, Wanted};
 use crate::dataset::{DatasetError, EpisodePictures};
 
 /// Some rows of an episode.
@@ -70,7 +70,7 @@ impl PictureLoader {
     /// # Errors
     ///
     /// As [`EpisodePictures::visit`], or when the list has none there.
-    pub fn get(&self, wanted: &Wanted) -> Result<Vec<Arc<Vec<u8>>>, Arc<DatasetError>> {
+    pub fn get(&self, wanted: &Wanted) -> Found {
         let mut shelf = self.shared.lock();
         loop {
             if let Some(found) = shelf.find(wanted) {

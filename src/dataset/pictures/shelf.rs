@@ -16,6 +16,8 @@ pub struct Wanted {
 
 /// `[height, width, 3]`, a byte each; or why there is none.
 pub(super) type Decoded = Result<Arc<Vec<u8>>, Arc<DatasetError>>;
+/// All that was wanted, or why there is not.
+pub(super) type Found = Result<Vec<Arc<Vec<u8>>>, Arc<DatasetError>>;
 
 /// What is decoded, and what is to be.
 #[derive(Default)]
@@ -64,7 +66,7 @@ impl Shelf {
     }
 
     /// What is wanted, when all of it is there; or the first reason why some of it cannot be.
-    pub(super) fn find(&self, wanted: &Wanted) -> Option<Result<Vec<Arc<Vec<u8>>>, Arc<DatasetError>>> {
+    pub(super) fn find(&self, wanted: &Wanted) -> Option<Found> {
         let kept = wanted.frames.iter().map(|&frame| self.decoded.get(&(wanted.position, frame)));
         let kept: Option<Vec<&Kept>> = kept.collect();
         kept.map(|kept| kept.into_iter().map(|kept| kept.picture.clone()).collect())
