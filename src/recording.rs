@@ -44,6 +44,7 @@ mod pushes;
 mod reader;
 mod repair;
 mod schema;
+mod sink;
 mod start;
 mod stream;
 mod transform;

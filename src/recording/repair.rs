@@ -18,8 +18,9 @@ use super::error::{Damage, RecordingError};
 use super::index::{Channel, check_metadata, parse_metadata, parse_plan};
 use super::reader::ShardReader;
 use super::schema::Topic;
+use super::sink::{METADATA, PLAN};
 use super::stream::{RawMessage, Stream, damaged};
-use super::writer::{METADATA, PLAN, ShardSummary, ShardWriter};
+use super::writer::{ShardSummary, ShardWriter};
 use crate::artifact::{IoError, Plan, read_json};
 use crate::trace::Episode;
 

@@ -13,34 +13,23 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Metadata, op};
-use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
-use prost::Message;
+use mcap::McapError;
 
-use super::calls::{self, Step};
+use super::calls;
 use super::cameras::{Cameras, Filmed};
-use super::container::{MAX_RECORD_BYTES, NoSummary, Summary};
+use super::container::{NoSummary, Summary};
 use super::error::{EpisodeProblem, RecordingError};
-use super::schema::{CameraTopic, SCHEMA_VERSION, Topic, proto};
-use super::{observation, pushes, start, transform, viewer};
+use super::schema::SCHEMA_VERSION;
+use super::sink::{Sink, Times};
+use super::transform;
 use crate::artifact::{AtomicFile, IoError};
-use crate::geometry::Pose;
 use crate::program::{Program, vocabulary_hash};
 use crate::render::CameraConfig;
 use crate::task::Family;
-use crate::trace::{Episode, Frame};
+use crate::trace::Episode;
 
 /// Simulated time between an episode's end and the next one's start.
 const GAP_NANOS: u64 = 1_000_000_000;
-/// A chunk is closed by the first message that takes it past this size.
-const CHUNK_BYTES: u64 = 1 << 20;
-/// Fixed, because the library's default may change between versions.
-const ZSTD_LEVEL: u32 = 3;
-const HALF_RECORD_BYTES: usize = MAX_RECORD_BYTES / 2;
-/// Name of the metadata record.
-pub(super) const METADATA: &str = "ntp.recording";
-/// Name of the attachment that holds the stage's plan.
-pub(super) const PLAN: &str = "plan.json";
 
 /// What a finished shard holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,19 +65,11 @@ impl ShardWriter {
     /// When the file cannot be made.
     pub fn create(path: &Path, plan_json: &str) -> Result<Self, RecordingError> {
         let file = AtomicFile::create(path)?;
-        let options = WriteOptions::new()
-            .profile("")
-            .library(format!("ntp/{} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
-            .compression(Some(Compression::Zstd))
-            .compression_level(ZSTD_LEVEL)
-            // The default is as many as the machine has: the bytes would depend on it.
-            .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES));
-        let mcap = options.create(file).map_err(|error| failed(path, error))?;
+        let sink = Sink::new(file).map_err(|error| failed(path, error))?;
         Ok(Self {
             path: path.to_owned(),
             plan_json: plan_json.to_owned(),
-            sink: Sink { mcap, sequences: vec![0; Topic::ALL.len()], buffer: Vec::new() },
+            sink,
             cameras: Cameras::default(),
             family: None,
             next_start_nanos: 0,
@@ -109,8 +90,7 @@ impl ShardWriter {
     }
 
     fn set_cameras(&mut self, cameras: Cameras) {
-        let n_topics = Topic::ALL.len() + TOPICS_PER_CAMERA * cameras.declared().len();
-        self.sink.sequences.resize(n_topics, 0);
+        self.sink.set_cameras(cameras.declared().len());
         self.cameras = cameras;
     }
 
@@ -217,222 +197,9 @@ impl ShardWriter {
     }
 }
 
-/// Log times of an episode.
-struct Times {
-    start_nanos: u64,
-    end_nanos: u64,
-    next_start_nanos: u64,
-}
-
-/// The library's writer with one channel a topic.
-struct Sink {
-    mcap: Writer<AtomicFile>,
-    /// Next sequence number of each topic, then of those of each camera.
-    sequences: Vec<u32>,
-    buffer: Vec<u8>,
-}
-
-impl Sink {
-    fn declare(&mut self, metadata: BTreeMap<String, String>, cameras: &Cameras) -> Result<(), McapError> {
-        self.mcap.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
-        for topic in Topic::ALL {
-            let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
-            let id = channel_id(topic);
-            self.mcap.add_channel_with_id(id, schema, topic.name(), "protobuf", &BTreeMap::new())?;
-        }
-        for (number, (camera, format)) in cameras.declared().iter().enumerate() {
-            let pictures = CameraTopic::pictures(*format);
-            for (kind, topic) in [CameraTopic::Calibration, CameraTopic::Transform, pictures].into_iter().enumerate() {
-                let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
-                let id = camera_channel(number, kind) as u16 + 1;
-                self.mcap.add_channel_with_id(id, schema, &topic.name(camera), "protobuf", &BTreeMap::new())?;
-            }
-        }
-        Ok(())
-    }
-
-    fn episode(
-        &mut self,
-        times: &Times,
-        episode: &Episode,
-        steps: &[(u32, Step)],
-        mut filmed: Vec<Filmed>,
-    ) -> Result<(), McapError> {
-        let start_nanos = times.start_nanos;
-        self.put(Topic::EpisodeStart, start_nanos, &start::encode(episode))?;
-        self.put(Topic::Scene, start_nanos, &viewer::scene(start_nanos, episode))?;
-        self.put(Topic::Log, start_nanos, &viewer::start_log(start_nanos, episode))?;
-        for (number, camera) in filmed.iter().enumerate() {
-            self.put_channel(camera_channel(number, 0), start_nanos, &camera.calibration(start_nanos))?;
-            self.put_channel(camera_channel(number, 1), start_nanos, &camera.transform(start_nanos))?;
-        }
-        let mut steps = steps.iter().copied().peekable();
-        let mut running = Vec::new();
-        for (position, frame) in episode.frames.iter().enumerate() {
-            let before = position.checked_sub(1).map(|before| &episode.frames[before]);
-            self.frame(start_nanos, episode, position as u32, frame, before)?;
-            for (number, camera) in filmed.iter_mut().enumerate() {
-                let log_time_nanos = start_nanos + frame.time_nanos;
-                let picture = camera.picture(log_time_nanos, position);
-                self.put_channel(camera_channel(number, 2), log_time_nanos, &picture)?;
-            }
-            let mut changed = false;
-            while let Some((_, step)) = steps.next_if(|&(at, _)| at == position as u32) {
-                self.step(start_nanos, episode, step, &mut running)?;
-                changed = true;
-            }
-            if changed {
-                self.put(Topic::Stack, start_nanos + frame.time_nanos, &viewer::stack(&running))?;
-            }
-            for push in episode.pushes.iter().filter(|push| push.frames.begin as usize == position) {
-                let log_time_nanos = start_nanos + frame.time_nanos;
-                self.put(Topic::Push, log_time_nanos, &pushes::encode(push))?;
-                self.put(Topic::Log, log_time_nanos, &viewer::push_log(log_time_nanos, &episode.scene, push))?;
-            }
-        }
-        self.put(Topic::Log, times.end_nanos, &viewer::end_log(times.end_nanos, episode))?;
-        self.put(Topic::EpisodeEnd, times.end_nanos, &encode_end(episode))
-    }
-
-    fn frame(
-        &mut self,
-        start_nanos: u64,
-        episode: &Episode,
-        position: u32,
-        frame: &Frame,
-        before: Option<&Frame>,
-    ) -> Result<(), McapError> {
-        let log_time_nanos = start_nanos + frame.time_nanos;
-        let mut buffer = std::mem::take(&mut self.buffer);
-        buffer.clear();
-        encode_transforms(log_time_nanos, episode, frame, before, &mut buffer);
-        let written = self.put_bytes(Topic::Transforms, log_time_nanos, &buffer);
-        self.buffer = buffer;
-        written?;
-        self.put(Topic::Observation, log_time_nanos, &observation::encode(position, frame))
-    }
-
-    fn step(
-        &mut self,
-        start_nanos: u64,
-        episode: &Episode,
-        step: Step,
-        running: &mut Vec<Program>,
-    ) -> Result<(), McapError> {
-        let time = |frame: u32| start_nanos + episode.frames[frame as usize].time_nanos;
-        match step {
-            Step::Call(position) => {
-                let call = &episode.calls[position];
-                running.push(call.program);
-                self.put(Topic::Call, time(call.frames.begin), &calls::encode_call(call))
-            }
-            Step::Return(position) => {
-                let call = &episode.calls[position];
-                running.pop();
-                let (begin, end) = (time(call.frames.begin), time(call.frames.last()));
-                self.put(Topic::Return, end, &calls::encode_return(call))?;
-                self.put(Topic::Event, end, &viewer::event(begin, end, &episode.scene, call))
-            }
-        }
-    }
-
-    fn put(&mut self, topic: Topic, log_time_nanos: u64, message: &impl Message) -> Result<(), McapError> {
-        let mut buffer = std::mem::take(&mut self.buffer);
-        buffer.clear();
-        message.encode_raw(&mut buffer);
-        let written = self.put_bytes(topic, log_time_nanos, &buffer);
-        self.buffer = buffer;
-        written
-    }
-
-    fn put_bytes(&mut self, topic: Topic, log_time_nanos: u64, message: &[u8]) -> Result<(), McapError> {
-        self.put_channel(topic as usize, log_time_nanos, message)
-    }
-
-    fn put_channel(&mut self, channel: usize, log_time_nanos: u64, message: &[u8]) -> Result<(), McapError> {
-        check_size(op::MESSAGE, message)?;
-        let sequence = &mut self.sequences[channel];
-        let header = MessageHeader {
-            channel_id: channel as u16 + 1,
-            sequence: *sequence,
-            log_time: log_time_nanos,
-            publish_time: log_time_nanos,
-        };
-        *sequence = sequence.wrapping_add(1);
-        self.mcap.write_to_known_channel(&header, message)
-    }
-
-    fn close(mut self, plan_json: &str) -> Result<AtomicFile, McapError> {
-        check_size(op::ATTACHMENT, plan_json.as_bytes())?;
-        self.mcap.attach(&Attachment {
-            log_time: 0,
-            create_time: 0,
-            name: PLAN.to_owned(),
-            media_type: "application/json".to_owned(),
-            data: plan_json.as_bytes().into(),
-        })?;
-        self.mcap.finish()?;
-        Ok(self.mcap.into_inner())
-    }
-}
-
-/// What a reader would refuse is not written. Half of its limit leaves room for the rest of a record and of a chunk.
-fn check_size(opcode: u8, content: &[u8]) -> Result<(), McapError> {
-    match content.len() {
-        0..=HALF_RECORD_BYTES => Ok(()),
-        len => Err(McapError::RecordTooLarge { opcode, len: len as u64 }),
-    }
-}
-
-/// Calibration, place and pictures.
-const TOPICS_PER_CAMERA: usize = 3;
-
-/// Position among all channels of a camera's calibration (0), place (1) or pictures (2).
-fn camera_channel(camera: usize, kind: usize) -> usize {
-    Topic::ALL.len() + TOPICS_PER_CAMERA * camera + kind
-}
-
-fn channel_id(topic: Topic) -> u16 {
-    topic as u16 + 1
-}
-
 fn failed(path: &Path, error: McapError) -> RecordingError {
     match error {
         McapError::Io(source) => IoError::system("write", path)(source).into(),
         error => RecordingError::Write { path: path.to_owned(), source: Box::new(error) },
-    }
-}
-
-/// The gripper, and the bodies that are elsewhere than in the frame before.
-fn encode_transforms(
-    log_time_nanos: u64,
-    episode: &Episode,
-    frame: &Frame,
-    before: Option<&Frame>,
-    buffer: &mut Vec<u8>,
-) {
-    transform::encode(log_time_nanos, transform::GRIPPER, &frame.state.gripper_in_world, buffer);
-    for (position, (body, pose)) in episode.scene.bodies.iter().zip(&frame.state.bodies_in_world).enumerate() {
-        if before.is_none_or(|before| bits(&before.state.bodies_in_world[position]) != bits(pose)) {
-            transform::encode(log_time_nanos, &body.name, pose, buffer);
-        }
-    }
-}
-
-fn bits(pose: &Pose) -> [u32; 7] {
-    let [x, y, z] = pose.translation.vector.into();
-    let [i, j, k, w] = pose.rotation.coords.into();
-    [x, y, z, i, j, k, w].map(f32::to_bits)
-}
-
-fn encode_end(episode: &Episode) -> proto::EpisodeEnd {
-    proto::EpisodeEnd {
-        index: episode.provenance.index,
-        success: episode.outcome.is_success(),
-        cause: episode.outcome.cause().map_or("", crate::trace::Cause::name).to_owned(),
-        frames: episode.frames.len() as u32,
-        boundary_frames: episode.boundary_frames().count() as u32,
-        calls: episode.calls.len() as u32,
-        pushes: episode.pushes.len() as u32,
     }
 }
