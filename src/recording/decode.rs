@@ -29,12 +29,7 @@ fn check_camera(seen: &CameraPictures) -> Result<(), (usize, VideoError)> {
             None => decode_png(bytes).map(|decoded| picture = decoded),
             Some(decoder) => decoder.decode(bytes, &mut picture),
         };
-        decoded.and_then(|()| check_size(&picture, seen.size_px)).map_err(|error| (frame, error))?;
+        decoded.and_then(|()| picture.check_size(seen.size_px)).map_err(|error| (frame, error))?;
     }
     Ok(())
-}
-
-fn check_size(picture: &Rgb, expected: [u32; 2]) -> Result<(), VideoError> {
-    let found = picture.size_px;
-    if found == expected { Ok(()) } else { Err(VideoError::Size { found, expected }) }
 }

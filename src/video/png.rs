@@ -14,6 +14,14 @@ pub struct Rgb {
     pub bytes: Vec<u8>,
 }
 
+impl Rgb {
+    /// Refuses a picture of another size.
+    pub(crate) fn check_size(&self, expected: [u32; 2]) -> Result<(), VideoError> {
+        let found = self.size_px;
+        if found == expected { Ok(()) } else { Err(VideoError::Size { found, expected }) }
+    }
+}
+
 /// The widest and highest picture that is decoded.
 const MAX_SIDE_PX: u32 = 1 << 14;
 

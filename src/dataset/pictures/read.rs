@@ -127,7 +127,7 @@ impl EpisodePictures {
                 let encoded = file.read(&of_file).map_err(|error| wrong(words(&error)))?;
                 for (&row, png) in rows.iter().zip(&encoded) {
                     let picture = decode_png(png).map_err(wrong_row(row))?;
-                    check_size(&picture, *expected).map_err(wrong_row(row))?;
+                    picture.check_size(*expected).map_err(wrong_row(row))?;
                     visit(&picture);
                 }
             }
@@ -137,7 +137,7 @@ impl EpisodePictures {
                 let mut video = Mp4Pictures::new(file).map_err(|error| wrong(error.to_string()))?;
                 for &row in rows {
                     let picture = video.get(place.first.saturating_add(row as usize)).map_err(wrong_row(row))?;
-                    check_size(picture, *expected).map_err(wrong_row(row))?;
+                    picture.check_size(*expected).map_err(wrong_row(row))?;
                     visit(picture);
                 }
             }
@@ -189,11 +189,6 @@ impl EpisodePictures {
         let problem = format!("{}: {problem}", self.feature);
         Err(DatasetError::Episode { path, episode: episode as i64, problem })
     }
-}
-
-fn check_size(picture: &Rgb, expected: [u32; 2]) -> Result<(), VideoError> {
-    let found = picture.size_px;
-    if found == expected { Ok(()) } else { Err(VideoError::Size { found, expected }) }
 }
 
 /// What is wrong with a table, whose path stands before it.
