@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde_json::{Value, json};
 
-use crate::artifact::{Manifest, Plan, read_json};
+use crate::artifact::{Plan, StageDir};
 use crate::cli::ReplayArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
@@ -169,7 +169,9 @@ fn secs_of(episode: &Episode, frame: u32) -> f64 {
 pub(super) fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
     let files = recordings(path)?;
     if let Some(folder) = files[0].parent().filter(|_| path.is_dir()) {
-        check_listed(folder)?;
+        // Episodes are counted through all recordings, so none of a finished stage may be missing.
+        let stage = StageDir::new("recordings", folder);
+        stage.manifest()?.map_or(Ok(()), |manifest| stage.check_files(&manifest, false))?;
     }
     let mut found = Vec::new();
     let mut n_episodes = 0;
@@ -235,18 +237,4 @@ pub(super) fn recordings(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     anyhow::bail!("no recording (.mcap) in {}", path.display())
-}
-
-/// Makes sure that every recording is there that a finished stage wrote: episodes are counted through all of them.
-fn check_listed(folder: &Path) -> anyhow::Result<()> {
-    let manifest = folder.join("manifest.json");
-    if !manifest.is_file() {
-        return Ok(());
-    }
-    let listed: Manifest = read_json(&manifest)?;
-    let mut missing = listed.files.iter().map(|file| folder.join(&file.path)).filter(|file| !file.is_file());
-    match missing.next() {
-        Some(file) => anyhow::bail!("{}: missing, but listed in {}", file.display(), manifest.display()),
-        None => Ok(()),
-    }
 }
