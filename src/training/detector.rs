@@ -26,7 +26,8 @@ use crate::training::{Gallery, Hooks, Progress, TrainError};
 
 /// Groups of a step. A fixed number, since the sum of gradients must not depend on the machine.
 const GROUPS: usize = 2;
-/// Pictures of a trial in a group, at most. They show much the same: the more trials, the more is learned.
+/// Pictures of a trial in a group, at most. They show much the same, which slows a network of VGG16's shape; colour slots
+/// learn as well from more of them.
 const OF_TRIAL: usize = 2;
 
 /// Trials whose pictures are in memory at a time while a finished detector looks at all of them; as many are made ready.
