@@ -237,3 +237,30 @@ fn a_damaged_picture_stops_training_with_task_episode_and_camera() {
     }
     assert!(!folder.path().join("run/models/ntp_vid_e2e-seed0/config.json").exists());
 }
+
+#[test]
+fn a_frame_rendered_as_filmed_is_the_recorded_picture_and_a_camera_that_is_not_there_is_named_with_those_that_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let moved = "size_px = [32, 32]\nrandomize = { light = 0.5, color = 0.3, camera_m = 0.03, camera_rad = 0.05 }";
+    let [pipeline, out] = written(folder.path(), |text| text.replacen("size_px = [32, 32]", moved, 1));
+    assert_eq!(command(&["run", &pipeline, "--out", &out, "--to", "generate"]).0, 0);
+    let recordings = folder.path().join("run/recordings");
+    let mut files: Vec<_> = std::fs::read_dir(&recordings).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "mcap"));
+    files.sort();
+    let first = ShardReader::open(&files[0]).unwrap().pictured().next().unwrap().unwrap();
+    let png = folder.path().join("frame.png");
+    let render = |camera: &[&str]| {
+        let paths = [recordings.to_str().unwrap(), "--episode", "0", "--frame", "7", "--png", png.to_str().unwrap()];
+        command(&[&["render"], &paths[..], camera].concat())
+    };
+    let (code, stderr) = render(&["--camera", "front", "--as-filmed"]);
+    assert_eq!(code, 0, "{stderr}");
+    let rendered = decode_png(&std::fs::read(&png).unwrap()).unwrap();
+    assert!(rendered == decode_png(&first.cameras[0].pictures[7]).unwrap());
+    let (code, stderr) = render(&["--camera", "side"]);
+    assert!(code == 2 && stderr.contains("the recording's cameras are: front, wrist"), "{code}: {stderr}");
+    std::fs::remove_file(&files[1]).unwrap();
+    let (code, stderr) = render(&[]);
+    assert!(code == 1 && stderr.contains(files[1].to_str().unwrap()) && stderr.contains("missing"), "{code}: {stderr}");
+}
