@@ -56,7 +56,6 @@ use files::Moved;
 pub use folder::Folder;
 pub use license::{License, UnknownLicense};
 pub use publication::{NoRelease, Publication, Release};
-pub use tables::meaning;
 
 /// Words under which the dataset is found.
 const TAGS: [&str; 6] =

@@ -16,11 +16,11 @@ mod oracle;
 mod policy;
 mod rows;
 
-pub use detections::{Detected, DetectionRows};
+pub use detections::{Detected, DetectionRows, SCHEMA as DETECTIONS};
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use expectation::Expectation;
 pub use interpreter::{Eye, Limits, RolloutEpisode, Sight, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, Query, Specification};
-pub use rows::{Acted, RolloutRows};
+pub use rows::{Acted, RolloutRows, SCHEMA as ROLLOUTS};

@@ -1,9 +1,11 @@
-//! Parquet tables: columns in memory to and from a file whose schema text is in schemas/parquet.
+//! Parquet tables: declared once; columns in memory to and from files.
 //!
 //! # Input and output
 //!
-//! A [`TableSchema`] holds a `schemas/parquet/NAME.message` file, Parquet's own message text. [`write`] refuses columns
-//! that are not exactly as it says; [`read`] and [`TableReader`] take columns by name and pass over any others.
+//! A table is declared once, by `table!` (see `declare`), in the room that fills it: of its list of columns come the
+//! rows, the contract ([`TableSchema`]), `schemas/parquet/NAME.message` and what the README there says. [`write`] refuses
+//! columns that are not exactly as the contract says; [`read`] and [`TableReader`] take columns by name and pass over any
+//! others. A column that came later is null in files that lack it.
 //!
 //! # Errors
 //!
@@ -17,26 +19,31 @@
 mod arrays;
 mod batches;
 mod column;
+mod declare;
 mod encode;
 mod error;
 mod guard;
 mod kind;
+pub(crate) mod kinds;
 mod pictures;
 mod read;
 mod schema;
 mod values;
+mod words;
 mod write;
 
 pub(crate) use arrays::{FloatRows, TextRows};
 pub(crate) use batches::{BatchReader, BatchWriter};
 pub use column::{Column, Columns};
+pub(crate) use declare::{TableRows, column_name, schema, table};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
 pub(crate) use pictures::PictureReader;
 pub(crate) use read::read_further;
 pub use read::{TableReader, file_columns, read};
-pub use schema::TableSchema;
+pub use schema::{ColumnSpec, TableSchema};
 pub(crate) use values::Values;
+pub(crate) use words::TextTable;
 pub use write::write;
 pub(crate) use write::{TableWriter, WriteOptions};

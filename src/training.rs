@@ -22,6 +22,7 @@ mod config;
 mod curriculum;
 mod detector;
 mod detector_config;
+mod detector_metrics;
 mod error;
 mod examples;
 mod learner;
@@ -32,12 +33,12 @@ mod seen;
 
 pub use batch::{Group, Part, draw};
 pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};
-pub use detector::DetectorMetric;
 pub use detector_config::DetectorTraining;
+pub use detector_metrics::{DetectorMetric, SCHEMA as DETECTOR_METRICS};
 pub use error::TrainError;
 pub use examples::{Example, Examples, Grain};
 pub use learner::{Learner, Losses, losses};
-pub use metrics::Metric;
+pub use metrics::{Metric, SCHEMA as METRICS};
 pub use seen::Gallery;
 
 use std::path::Path;
@@ -229,7 +230,7 @@ impl NetworkUse for Learning<'_, '_> {
         let examples = Examples::of(&detected, SpecificationForm::Trajectories, N::DECISIONS, grain)?;
         let run = Run { config, examples: &examples, gallery: None, model, folder, seed };
         let (programmer, trained) = run.train(programmer, hooks)?;
-        detector::write_metrics(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
+        detector_metrics::write(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
         let network = Detecting::new(detector, programmer, data.n_slots);
         write(folder, model, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;

@@ -3,8 +3,8 @@
 use std::iter::repeat_n;
 
 use crate::dataset::episode_view::{CallSpans, EpisodeView};
-use crate::dataset::text::TextTable;
 use crate::program::Program;
+use crate::table::TextTable;
 use crate::table::{Values, WriteOptions};
 use crate::trace::{ProgramCall, ScopingLabel, sentence};
 

@@ -140,7 +140,7 @@ impl EpisodeRows {
     }
 
     fn reader(root: &Path) -> Result<TableReader, DatasetError> {
-        let columns = EPISODES.columns()?;
+        let columns = EPISODES.columns();
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         Ok(TableReader::open_columns(&root.join(layout::EPISODES), &EPISODES, &names)?)
     }

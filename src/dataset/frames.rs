@@ -5,8 +5,8 @@
 use crate::dataset::episode_view::EpisodeView;
 use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
 use crate::dataset::program_paths::ProgramPaths;
-use crate::dataset::text::{TextTable, subtask_text};
-use crate::table::{Values, WriteOptions};
+use crate::dataset::text::subtask_text;
+use crate::table::{TextTable, Values, WriteOptions};
 use crate::trace::{Frame, Observation};
 
 const POSITION_WIDTH: usize = 3;

@@ -1,7 +1,7 @@
 //! Stacks of running programs as texts, each kept once: `block_stacking/pick_and_place/pick`.
 
-use crate::dataset::text::TextTable;
 use crate::program::Program;
+use crate::table::TextTable;
 use crate::trace::ProgramCall;
 
 /// The paths of an episode's calls, by their numbers among all paths so far.

@@ -1,31 +1,44 @@
-//! What a detector found in demonstrations, beside the truth: rows of `detections.parquet`
-//! (schemas/parquet/detections.message).
+//! What a detector found in demonstrations, beside the truth: rows of `detections.parquet`.
 
 use std::path::Path;
 
 use crate::rollout::Acted;
 use crate::scene::{BodyIndex, Mobility, Scene};
-use crate::table::{self, Column, TableError, TableSchema};
+use crate::table::{TableError, TableRows as _, table};
 use crate::trace::{Episode, Observation};
 
 /// One row a movable body and boundary frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DetectionRows {
-    rows: Vec<DetectionRow>,
+    rows: Rows,
 }
 
-/// The columns of schemas/parquet/detections.message.
-#[derive(Clone, Debug, PartialEq)]
-struct DetectionRow {
-    variant: String,
-    suite: String,
-    training_seed: i64,
-    train_tasks: i64,
-    episode: i64,
-    frame: i64,
-    slot: String,
-    error_m: [f64; 3],
-    visible_share: f64,
+table! {
+    /// `detections.parquet` of a suite that a model behind a detector acted: a row for each movable body in each boundary frame of each demonstration that it was given. A detection is of that one picture, of a body's place in the world; the gripper's, which positions are told from, the robot knows.
+    detections {
+        /// the model's variant
+        variant: Text,
+        /// which suite
+        suite: Text,
+        /// of the model's training
+        training_seed: Int64,
+        /// tasks that the model was trained on
+        train_tasks: Int64,
+        /// position in the suite
+        episode: Int64,
+        /// boundary frame of the demonstration
+        frame: Int64,
+        /// which body: `block_A`
+        slot: Text,
+        /// detected minus true position along the world's x
+        error_x_m: Float64,
+        /// the same along y
+        error_y_m: Float64,
+        /// the same along z
+        error_z_m: Float64,
+        /// how much of the body's outline in the picture nothing hides, 0 to 1; 0 also outside of the picture
+        visible_share: Float64,
+    }
 }
 
 /// A demonstration as a detector saw it.
@@ -51,15 +64,17 @@ impl DetectionRows {
             let truth = recorded.observation();
             for (slot, body) in movable_slots(scene) {
                 let error = |axis: usize| f64::from(found[3 * slot + axis]) - f64::from(truth.slots_m[slot][axis]);
-                self.rows.push(DetectionRow {
-                    variant: variant.to_owned(),
-                    suite: suite.to_owned(),
+                self.rows.push(Row {
+                    variant: variant.into(),
+                    suite: suite.into(),
                     training_seed: by.training_seed as i64,
                     train_tasks: by.train_tasks.map_or(0, i64::from),
                     episode: episode as i64,
                     frame: frame as i64,
-                    slot: scene.slots[slot].name.clone(),
-                    error_m: [error(0), error(1), error(2)],
+                    slot: scene.slots[slot].name.as_str().into(),
+                    error_x_m: error(0),
+                    error_y_m: error(1),
+                    error_z_m: error(2),
                     visible_share: shares[usize::from(body.0)],
                 });
             }
@@ -68,7 +83,7 @@ impl DetectionRows {
 
     /// Adds rows at the end.
     pub fn append(&mut self, other: Self) {
-        self.rows.extend(other.rows);
+        self.rows.append(other.rows);
     }
 
     /// Writes the table.
@@ -77,24 +92,7 @@ impl DetectionRows {
     ///
     /// When it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), TableError> {
-        let rows = &self.rows;
-        let text = |get: fn(&DetectionRow) -> &String| Column::Text(rows.iter().map(|row| get(row).clone()).collect());
-        let int = |get: fn(&DetectionRow) -> i64| Column::Int64(rows.iter().map(get).collect());
-        let float = |get: fn(&DetectionRow) -> f64| Column::Float64(rows.iter().map(get).collect());
-        let columns = vec![
-            ("variant", text(|row| &row.variant)),
-            ("suite", text(|row| &row.suite)),
-            ("training_seed", int(|row| row.training_seed)),
-            ("train_tasks", int(|row| row.train_tasks)),
-            ("episode", int(|row| row.episode)),
-            ("frame", int(|row| row.frame)),
-            ("slot", text(|row| &row.slot)),
-            ("error_x_m", float(|row| row.error_m[0])),
-            ("error_y_m", float(|row| row.error_m[1])),
-            ("error_z_m", float(|row| row.error_m[2])),
-            ("visible_share", float(|row| row.visible_share)),
-        ];
-        table::write(path, &TableSchema::DETECTIONS, columns)
+        self.rows.write(path)
     }
 
     /// Reads the table.
@@ -103,32 +101,7 @@ impl DetectionRows {
     ///
     /// When it is not there or not such a table.
     pub fn read(path: &Path) -> Result<Self, TableError> {
-        let mut columns = table::read(path, &TableSchema::DETECTIONS)?;
-        let mut variant = columns.text("variant")?.into_iter();
-        let mut suite = columns.text("suite")?.into_iter();
-        let mut training_seed = columns.int64("training_seed")?.into_iter();
-        let mut train_tasks = columns.int64("train_tasks")?.into_iter();
-        let mut episode = columns.int64("episode")?.into_iter();
-        let mut frame = columns.int64("frame")?.into_iter();
-        let mut slot = columns.text("slot")?.into_iter();
-        let mut x = columns.float64("error_x_m")?.into_iter();
-        let mut y = columns.float64("error_y_m")?.into_iter();
-        let mut z = columns.float64("error_z_m")?.into_iter();
-        let mut visible_share = columns.float64("visible_share")?.into_iter();
-        let mut next = || {
-            Some(DetectionRow {
-                variant: variant.next()?,
-                suite: suite.next()?,
-                training_seed: training_seed.next()?,
-                train_tasks: train_tasks.next()?,
-                episode: episode.next()?,
-                frame: frame.next()?,
-                slot: slot.next()?,
-                error_m: [x.next()?, y.next()?, z.next()?],
-                visible_share: visible_share.next()?,
-            })
-        };
-        Ok(Self { rows: std::iter::from_fn(&mut next).collect() })
+        Ok(Self { rows: Rows::read(path)? })
     }
 }
 

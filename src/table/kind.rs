@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use arrow::datatypes::DataType;
 use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as PhysicalType};
 use parquet::schema::types::Type;
 
@@ -65,6 +66,45 @@ impl ColumnKind {
         let innermost = element_of(element_of(element)?)?;
         let is_channels = innermost.is_primitive() && value_of(innermost) == Some(Value::Float64);
         is_channels.then_some(Self { value: Value::Channels, form: Form::Required })
+    }
+
+    /// A column of this kind as a line of Parquet's message text.
+    pub(crate) fn declaration(self, name: &str) -> String {
+        let value = |name: &str| match self.value {
+            Value::Int64 => format!("int64 {name}"),
+            Value::Float32 => format!("float {name}"),
+            Value::Float64 | Value::Channels => format!("double {name}"),
+            Value::Boolean => format!("boolean {name}"),
+            Value::Text => format!("binary {name} (STRING)"),
+            Value::Picture => format!("binary {name}"),
+        };
+        let list = |name: &str, element: &str| {
+            format!("required group {name} (LIST) {{ repeated group list {{ {element} }} }}")
+        };
+        let element = format!("required {};", value("element"));
+        match (self.value, self.form) {
+            (Value::Picture, _) => {
+                format!("  required group {name} {{ optional binary bytes; optional binary path (STRING); }}\n")
+            }
+            (Value::Channels, _) => {
+                format!("  {}\n", list(name, &list("element", &list("element", &element))))
+            }
+            (_, Form::Required) => format!("  required {};\n", value(name)),
+            (_, Form::Optional) => format!("  optional {};\n", value(name)),
+            (_, Form::List) => format!("  {}\n", list(name, &element)),
+        }
+    }
+
+    /// What Arrow calls a column of this kind that may be null; `None` for lists and pictures, which never are.
+    pub(crate) fn nullable_type(self) -> Option<DataType> {
+        match (self.form, self.value) {
+            (Form::List, _) | (_, Value::Picture | Value::Channels) => None,
+            (_, Value::Int64) => Some(DataType::Int64),
+            (_, Value::Float32) => Some(DataType::Float32),
+            (_, Value::Float64) => Some(DataType::Float64),
+            (_, Value::Boolean) => Some(DataType::Boolean),
+            (_, Value::Text) => Some(DataType::Utf8),
+        }
     }
 
     /// Whether a column of this kind can be read where `expected` is asked for: values are of the same type, and a

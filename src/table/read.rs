@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
+use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch, new_null_array};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -25,7 +25,7 @@ const BATCH_ROWS: usize = 8192;
 ///
 /// When the file is not there, is truncated or corrupted, or lacks a column that the schema has.
 pub fn read(path: &Path, schema: &TableSchema) -> Result<Columns, TableError> {
-    let names: Vec<String> = schema.columns()?.into_iter().map(|(name, _)| name).collect();
+    let names: Vec<String> = schema.columns().into_iter().map(|(name, _)| name).collect();
     let mut reader = TableReader::open_columns(path, schema, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
     let mut columns = reader.empty_columns();
     while reader.append_batch(&mut columns)? {}
@@ -42,7 +42,7 @@ pub(crate) fn read_further(
     schema: &TableSchema,
     columns: &[(String, ColumnKind)],
 ) -> Result<Columns, TableError> {
-    let open = || TableReader::open_kinds(path, schema.name(), columns.to_vec());
+    let open = || TableReader::open_kinds(path, schema, columns.to_vec());
     let mut reader = guarded(path, open)?;
     let mut columns = reader.empty_columns();
     while reader.append_batch(&mut columns)? {}
@@ -54,6 +54,8 @@ pub struct TableReader {
     path: PathBuf,
     schema: &'static str,
     columns: Vec<(String, ColumnKind)>,
+    /// Those of them that came later than the file.
+    absent: Vec<(String, ColumnKind)>,
     reader: ParquetRecordBatchReader,
     footer: Arc<ParquetMetaData>,
     rows_read: u64,
@@ -70,22 +72,25 @@ impl TableReader {
     }
 
     fn open_unguarded(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
-        let parsed = schema.parse()?;
-        let named = |name: &&str| parsed.columns.iter().find(|(column, _)| column == name).cloned();
-        Self::open_kinds(path, schema.name(), names.iter().filter_map(named).collect())
+        let columns = schema.columns();
+        let named = |name: &&str| columns.iter().find(|(column, _)| column == name).cloned();
+        Self::open_kinds(path, schema, names.iter().filter_map(named).collect())
     }
 
-    fn open_kinds(path: &Path, schema: &'static str, columns: Vec<(String, ColumnKind)>) -> Result<Self, TableError> {
+    fn open_kinds(path: &Path, schema: &TableSchema, columns: Vec<(String, ColumnKind)>) -> Result<Self, TableError> {
         let file = File::open(path).map_err(IoError::system("open", path))?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let builder =
             ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
-        let roots = find_roots(path, schema, &columns, builder.metadata())?;
+        let fields = builder.metadata().file_metadata().schema().get_fields();
+        let is_there = |name: &str| !schema.is_later(name) || fields.iter().any(|field| field.name() == name);
+        let (there, absent): (Vec<_>, Vec<_>) = columns.iter().cloned().partition(|(name, _)| is_there(name));
+        let roots = find_roots(path, schema.name(), &there, builder.metadata())?;
         let footer = Arc::clone(builder.metadata());
         let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
         let reader =
             builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(TableError::parquet(path))?;
-        Ok(Self { path: path.to_owned(), schema, columns, reader, footer, rows_read: 0 })
+        Ok(Self { path: path.to_owned(), schema: schema.name(), columns, absent, reader, footer, rows_read: 0 })
     }
 
     /// Rows of the file, as its footer says.
@@ -133,19 +138,20 @@ impl TableReader {
 
     fn append(&self, name: &str, column: &mut Column, batch: &RecordBatch, first_row: u64) -> Result<(), TableError> {
         let array = self.array(name, column.kind(), batch, first_row)?;
-        append_array(column, array).ok_or_else(|| self.wrong(name, column.kind(), array.data_type().to_string()))
+        append_array(column, &array).ok_or_else(|| self.wrong(name, column.kind(), array.data_type().to_string()))
     }
 
     /// A column of a batch, without nulls where there must be none.
-    fn array<'b>(
+    fn array(
         &self,
         name: &str,
         expected: ColumnKind,
-        batch: &'b RecordBatch,
+        batch: &RecordBatch,
         first_row: u64,
-    ) -> Result<&'b ArrayRef, TableError> {
-        let array = batch.column_by_name(name).ok_or_else(|| self.wrong(name, expected, "missing".to_owned()))?;
-        match first_null(array, expected) {
+    ) -> Result<ArrayRef, TableError> {
+        let array = batch.column_by_name(name).cloned().or_else(|| self.nulls(name, batch.num_rows()));
+        let array = array.ok_or_else(|| self.wrong(name, expected, "missing".to_owned()))?;
+        match first_null(&array, expected) {
             None => Ok(array),
             Some(row) => Err(TableError::Null {
                 path: self.path.clone(),
@@ -154,6 +160,12 @@ impl TableReader {
                 row: first_row + row as u64,
             }),
         }
+    }
+
+    /// A column that came later than the file.
+    fn nulls(&self, name: &str, n_rows: usize) -> Option<ArrayRef> {
+        let (_, kind) = self.absent.iter().find(|(absent, _)| absent == name)?;
+        Some(new_null_array(&kind.nullable_type()?, n_rows))
     }
 
     fn wrong(&self, column: &str, expected: ColumnKind, found: String) -> TableError {
@@ -171,7 +183,7 @@ impl TableReader {
         let first_row = self.rows_read;
         let Some(batch) = self.next_batch()? else { return Ok(None) };
         let array = |(name, kind): &(String, ColumnKind)| {
-            Ok((name.clone(), *kind, ArrayRef::clone(self.array(name, *kind, &batch, first_row)?)))
+            Ok((name.clone(), *kind, self.array(name, *kind, &batch, first_row)?))
         };
         let arrays = self.columns.iter().map(array).collect::<Result<_, TableError>>()?;
         Ok(Some(Columns::of_batch(&self.path, self.schema, arrays)))

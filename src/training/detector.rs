@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 use crate::dataset::{DatasetTrials, Wanted};
 use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world};
 use crate::seed::Seed;
-use crate::table::{self, Column, TableError, TableSchema};
 use crate::trace::Observation;
 use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
 use crate::training::config::TrainConfig;
+use crate::training::detector_metrics::DetectorMetric;
 use crate::training::learner::Learner;
 use crate::training::run::dataset_hash;
 use crate::training::seen::{all_frames, fetch, sample};
@@ -32,22 +32,6 @@ const OF_TRIAL: usize = 2;
 
 /// Trials whose pictures are in memory at a time while a finished detector looks at all of them; as many are made ready.
 const PORTION: usize = 64;
-
-/// One row of `detector_metrics.parquet`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DetectorMetric {
-    /// The step, from 1.
-    pub step: u32,
-    /// Of positions.
-    pub loss: f32,
-    /// Mean distance between detected and true positions, in metres.
-    pub distance_m: f32,
-    /// Of the step.
-    pub learning_rate: f64,
-    /// How many pictures were learned from.
-    pub pictures: u32,
-}
 
 /// What the training of a detector is beyond its weights.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -220,19 +204,4 @@ pub(super) fn detected<D: Detector>(
     let mut detected = data.clone();
     detected.trials.iter_mut().zip(observations).for_each(|(trial, rows)| trial.observations = rows);
     Ok(detected)
-}
-
-/// Writes a detector's learning curve.
-pub(super) fn write_metrics(path: &Path, metrics: &[DetectorMetric]) -> Result<(), TableError> {
-    let floats = |value: fn(&DetectorMetric) -> f32| {
-        Column::OptionalFloat32(metrics.iter().map(|metric| Some(value(metric))).collect())
-    };
-    let columns = vec![
-        ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
-        ("loss", floats(|metric| metric.loss)),
-        ("distance_m", floats(|metric| metric.distance_m)),
-        ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
-        ("pictures", Column::Int64(metrics.iter().map(|metric| i64::from(metric.pictures)).collect())),
-    ];
-    table::write(path, &TableSchema::DETECTOR_METRICS, columns)
 }

@@ -1,12 +1,36 @@
-//! Learning curves, and their table `metrics.parquet` (schemas/parquet/metrics.message).
+//! Learning curves, and their table `metrics.parquet`.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::program::Program;
-use crate::table::{self, Column, TableError, TableSchema};
+use crate::table::{TableError, TableRows as _, table};
 use crate::training::learner::Losses;
+
+table! {
+    /// `metrics.parquet` of a model: its learning curves, a row a logged step and level.
+    metrics {
+        /// the step, from 1
+        step: Int64,
+        /// the running program whose decisions were learned
+        level: Text,
+        /// cross-entropy of the next program
+        loss_program: OptionalFloat32,
+        /// binary cross-entropy of the end of the program
+        loss_end: OptionalFloat32,
+        /// mean cross-entropy of the scoping labels; null where no scope is learned
+        loss_scope: OptionalFloat32,
+        /// cross-entropy of the argument; null where nothing is called with one
+        loss_argument: OptionalFloat32,
+        /// weighed and summed
+        loss_total: OptionalFloat32,
+        /// of the step
+        learning_rate: Float32,
+        /// decisions learned from
+        examples: Int64,
+    }
+}
 
 /// One row of `metrics.parquet`: the losses of one level in one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,17 +78,19 @@ impl Metric {
 ///
 /// When the file cannot be written.
 pub(crate) fn write(path: &Path, metrics: &[Metric]) -> Result<(), TableError> {
-    let losses = |loss: fn(&Metric) -> Option<f32>| Column::OptionalFloat32(metrics.iter().map(loss).collect());
-    let columns = vec![
-        ("step", Column::Int64(metrics.iter().map(|metric| i64::from(metric.step)).collect())),
-        ("level", Column::Text(metrics.iter().map(|metric| metric.level.name().to_owned()).collect())),
-        ("loss_program", losses(|metric| Some(metric.loss_program))),
-        ("loss_end", losses(|metric| Some(metric.loss_end))),
-        ("loss_scope", losses(|metric| metric.loss_scope)),
-        ("loss_argument", losses(|metric| metric.loss_argument)),
-        ("loss_total", losses(|metric| Some(metric.loss_total))),
-        ("learning_rate", Column::Float32(metrics.iter().map(|metric| metric.learning_rate as f32).collect())),
-        ("examples", Column::Int64(metrics.iter().map(|metric| i64::from(metric.examples)).collect())),
-    ];
-    table::write(path, &TableSchema::METRICS, columns)
+    let mut rows = Rows::default();
+    for metric in metrics {
+        rows.push(Row {
+            step: i64::from(metric.step),
+            level: metric.level.name().into(),
+            loss_program: Some(metric.loss_program),
+            loss_end: Some(metric.loss_end),
+            loss_scope: metric.loss_scope,
+            loss_argument: metric.loss_argument,
+            loss_total: Some(metric.loss_total),
+            learning_rate: metric.learning_rate as f32,
+            examples: i64::from(metric.examples),
+        });
+    }
+    rows.write(path)
 }

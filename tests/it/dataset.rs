@@ -10,7 +10,7 @@ use ntp::dataset::{
 };
 use ntp::program::Program;
 use ntp::rollout::{Limits, Oracle, Start, run};
-use ntp::table::{self, Column, TableSchema};
+use ntp::table::{self, Column, ColumnKind, ColumnSpec, Form, TableSchema, Value};
 use ntp::task::{Split, Task};
 use ntp::trace::{
     Actor, Cause, Episode, EpisodeParts, Frame, Outcome, ProgramCall, Provenance, ScopingLabel, Span, instructions,
@@ -319,7 +319,7 @@ fn info_declares_every_column_in_types_that_all_readers_know() {
     assert_eq!(info["video_path"], "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4");
     let safe = ["float32", "float64", "int64", "bool", "string", "image", "video", "language"];
     let features = info["features"].as_object().unwrap();
-    let columns = schema::FRAMES.columns().unwrap();
+    let columns = schema::FRAMES.columns();
     assert_eq!(features.len(), columns.len());
     for (name, _) in columns {
         let feature = features[&name].as_object().unwrap();
@@ -476,9 +476,15 @@ fn a_broken_program_tree_is_named_by_its_rule() {
 
 #[test]
 fn a_dropped_column_is_named() {
+    const NUMBERS: ColumnKind = ColumnKind { value: Value::Int64, form: Form::Required };
     const WITHOUT: TableSchema = TableSchema::new(
         "without",
-        "message without { required int64 frame_index; required int64 episode_index; required int64 index; }",
+        "",
+        &[
+            ColumnSpec::new("frame_index", NUMBERS, ""),
+            ColumnSpec::new("episode_index", NUMBERS, ""),
+            ColumnSpec::new("index", NUMBERS, ""),
+        ],
     );
     let drop_columns = |root: &Path| {
         let path = root.join(FIRST_DATA);

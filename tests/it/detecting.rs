@@ -15,15 +15,15 @@ use ntp::model::{
 };
 use ntp::program::Program;
 use ntp::render::{Camera, Visibility};
-use ntp::rollout::{Acted, Detected, DetectionRows, load_policy};
+use ntp::rollout::{Acted, DETECTIONS, Detected, DetectionRows, load_policy};
 use ntp::scene::{BodyIndex, Scene, SceneState};
 use ntp::seed::Seed;
-use ntp::table::{TableSchema, read};
+use ntp::table::read;
 use ntp::task::{Family, Split, initial_state, scene};
 use ntp::trace::{Episode, GripperState, SpecificationForm};
 use ntp::training::{
-    DETECTOR_METRICS_FILE, DetectorTraining, Gallery, Hooks, Progress, TrainConfig, TrainError, TrainSummary, Training,
-    train_seeing,
+    DETECTOR_METRICS, DETECTOR_METRICS_FILE, DetectorTraining, Gallery, Hooks, Progress, TrainConfig, TrainError,
+    TrainSummary, Training, train_seeing,
 };
 
 use crate::kinematic::{demonstration, tower, trial};
@@ -64,7 +64,7 @@ fn learn(
 
 /// Mean distances in metres, step by step.
 fn curve(folder: &Path) -> Vec<f32> {
-    let mut table = read(&folder.join(DETECTOR_METRICS_FILE), &TableSchema::DETECTOR_METRICS).unwrap();
+    let mut table = read(&folder.join(DETECTOR_METRICS_FILE), &DETECTOR_METRICS).unwrap();
     table.optional_float32("distance_m").unwrap().into_iter().map(Option::unwrap).collect()
 }
 
@@ -325,7 +325,7 @@ fn errors_of_detections_are_told_of_what_moves_with_the_frames_that_they_are_of(
     let path = folder.path().join("detections.parquet");
     table.write(&path).unwrap();
     assert_eq!(DetectionRows::read(&path).unwrap(), table);
-    let mut columns = read(&path, &TableSchema::DETECTIONS).unwrap();
+    let mut columns = read(&path, &DETECTIONS).unwrap();
     let errors = columns.float64("error_y_m").unwrap();
     assert_eq!(errors.len(), 8 * n_frames);
     let wrong: Vec<usize> = (0..errors.len()).filter(|&row| errors[row].abs() > 1e-6).collect();

@@ -56,7 +56,7 @@ fn reruns_reader_finds_the_episodes_tasks_and_features_that_were_written() {
                 texts.push(episode.provenance.task_text.clone());
             }
         }
-        let columns = schema::FRAMES.columns().unwrap();
+        let columns = schema::FRAMES.columns();
         assert_eq!(opened.episode_frames, frames);
         assert_eq!(opened.tasks, texts);
         assert!(opened.n_subtasks > 1);

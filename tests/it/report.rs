@@ -507,7 +507,8 @@ fn rows_in_any_order_give_the_same_results() {
 
 /// The ten rollouts by the writer that the rollout stage uses.
 fn write_own_table(path: &Path) {
-    use ntp::table::{Column, TableSchema, write};
+    use ntp::rollout::ROLLOUTS;
+    use ntp::table::{Column, write};
     let rows = ten_rollouts();
     let text = |of: fn(&Rollout) -> &str| Column::Text(rows.iter().map(|row| of(row).to_owned()).collect());
     let whole = |of: fn(&Rollout) -> i64| Column::Int64(rows.iter().map(of).collect());
@@ -537,7 +538,7 @@ fn write_own_table(path: &Path) {
         ("pushes", Column::OptionalInt64(rows.iter().map(|row| disturbed(row, 1)).collect())),
         ("toppled", Column::OptionalInt64(rows.iter().map(|row| disturbed(row, 2)).collect())),
     ];
-    write(path, &TableSchema::ROLLOUTS, columns).unwrap();
+    write(path, &ROLLOUTS, columns).unwrap();
 }
 
 #[test]

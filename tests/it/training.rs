@@ -9,12 +9,11 @@ use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
-use ntp::table::TableSchema;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, Provenance, Span, SpecificationForm, Vocabulary, instructions};
 use ntp::training::{
-    Curriculum, Example, Examples, Grain, Hooks, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError, TrainSummary,
-    Training, draw, train,
+    Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError,
+    TrainSummary, Training, draw, train,
 };
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
@@ -334,7 +333,7 @@ fn a_models_folder_tells_how_it_was_made() {
     assert_eq!((config.variant, config.family, config.n_slots), (Variant::Ntp, Family::BlockStacking, 8));
     let training: Training = serde_json::from_value(config.training).unwrap();
     assert_eq!(training, ntp(short()).resolved());
-    let mut table = ntp::table::read(&folder.path().join(METRICS_FILE), &TableSchema::METRICS).unwrap();
+    let mut table = ntp::table::read(&folder.path().join(METRICS_FILE), &METRICS).unwrap();
     let steps = table.int64("step").unwrap();
     assert_eq!(steps, summary.metrics.iter().map(|metric| i64::from(metric.step)).collect::<Vec<_>>());
     assert_eq!(steps.len(), 6 * 4);

@@ -28,7 +28,7 @@ use crate::dataset::layout::{self, FilePlace};
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
 use crate::dataset::statistics::{NumericFeature, Statistics};
 use crate::dataset::tables::{EPISODE_GROUP_ROWS, GROUP_ROWS, MEGABYTE, SCOPE_GROUP_ROWS};
-use crate::dataset::text::TextTable;
+use crate::table::TextTable;
 use crate::table::{BatchWriter, WriteOptions};
 use crate::task::Family;
 
