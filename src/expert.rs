@@ -33,10 +33,8 @@ pub fn demonstrate(task: &Task, world: &mut dyn RobotApi, provenance: Provenance
     let mut run = Run { world, calls: CallRecorder::new(task.family.root_program(), whole) };
     let acted = run.root(task);
     let Run { world, calls } = run;
-    let outcome = match acted.and_then(|()| judge(task, world)) {
-        Ok(()) => Outcome::Success,
-        Err(cause) => Outcome::Failure(cause),
-    };
+    let cause = acted.err().or_else(|| judge(task, world).cause);
+    let outcome = cause.map_or(Outcome::Success, Outcome::Failure);
     let frames = world.frames().to_vec();
     let n_frames = frames.len() as u32;
     Episode::new(EpisodeParts {

@@ -18,6 +18,7 @@ mod demonstration;
 mod detections;
 mod error;
 mod eye;
+mod facts;
 mod gallery;
 mod generate;
 mod layout;

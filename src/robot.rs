@@ -7,7 +7,7 @@
 
 mod judge;
 
-pub use judge::judge;
+pub use judge::{Judgement, judge};
 
 use crate::program::Program;
 use crate::scene::{BodyIndex, Scene, SceneState, SlotIndex};

@@ -10,6 +10,7 @@
 mod detections;
 mod divergence;
 mod expectation;
+mod facts;
 mod interpreter;
 mod learned;
 mod oracle;
@@ -19,6 +20,7 @@ mod rows;
 pub use detections::{Detected, DetectionRows, SCHEMA as DETECTIONS};
 pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use expectation::Expectation;
+pub use facts::{ModelFacts, SuiteFacts};
 pub use interpreter::{Eye, Limits, RolloutEpisode, Sight, Start, run};
 pub use learned::{LearnedPolicy, load_policy};
 pub use oracle::Oracle;

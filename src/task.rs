@@ -15,7 +15,7 @@ mod sampler;
 mod set;
 
 pub use file::TaskFileError;
-pub use goal::{Condition, Goal, condition_holds, goal_holds, rests_on};
+pub use goal::{Condition, Goal, condition_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
 pub use layout::{CONTAINER_HALF_M, Trial, initial_state, scene};
 pub use sampler::{SampleError, TaskPool, sample};

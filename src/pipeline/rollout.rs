@@ -14,12 +14,13 @@ use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, detections, tasks};
+use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, detections, facts, tasks};
 use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
-    self, Acted, DetectionRows, Limits, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start, load_policy,
+    self, Acted, DetectionRows, Limits, ModelFacts, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start,
+    load_policy,
 };
 use crate::seed::Seed;
 use crate::sim::Simulation;
@@ -157,6 +158,7 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
         train_tasks: Some(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
         specification: Some(spec.specification().name()),
         decoder: Some(decoder.name()),
+        model: Some(ModelFacts::from(spec.variant)),
     };
     let name = model_name(spec, seed);
     let folder = context.dir.model(&name).path().to_owned();
@@ -262,7 +264,7 @@ impl Suite<'_> {
         let detections = self.detections(policy.as_ref(), &by, &starts);
         let acted = self.act(policy.as_mut(), starts)?;
         let part = format!("{PART}{shard:05}.parquet");
-        RolloutRows::of(&spec.name, &by, &acted).write(&unit.dir.path().join(&part))?;
+        RolloutRows::of(&spec.name, &facts::of_suite(&context.pipeline.spec, spec), &by, &acted).write(&unit.dir.path().join(&part))?;
         let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
         if let Some(detections) = detections {
             let part = format!("{DETECTIONS_PART}{shard:05}.parquet");

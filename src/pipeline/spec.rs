@@ -182,7 +182,7 @@ impl ModelSpec {
 pub struct RolloutSpec {
     /// Which tasks, and how many episodes.
     pub suites: Vec<SuiteSpec>,
-    /// How many episodes of each suite are recorded for replay.
+    /// How many episodes of each suite are recorded for replay, and beside them its first failures; with 0 nothing is.
     pub record: u32,
     /// A rollout is given up after so many times the expert's decisions.
     pub decisions_factor: f32,
@@ -232,6 +232,16 @@ pub enum OrderSpec {
     Own,
     /// Another: the same end by another way. Tasks of a single tower, which have no other, are left out.
     Shuffled,
+}
+
+impl OrderSpec {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Own => "own",
+            Self::Shuffled => "shuffled",
+        }
+    }
 }
 
 /// How results are shown.

@@ -1,26 +1,43 @@
-//! Whether a task is done once an actor has ended: at rest, and after what is carried away was carried.
+//! How far an episode came: which of its task's goals hold once the actor has ended, at rest, and after what is carried
+//! away was carried.
 
 use crate::robot::RobotApi;
-use crate::task::{Task, goal_holds};
+use crate::scene::SceneState;
+use crate::task::{Task, condition_holds};
 use crate::trace::Cause;
 
-/// Lets the world come to rest and judges it; where the family has a tray, carries it and judges again.
-///
-/// # Errors
-///
-/// [`Cause::EndedEarly`] when the goal does not hold at rest, [`Cause::FellWhenCarried`] when it no longer does after
-/// the carrying.
-pub fn judge(task: &Task, world: &mut dyn RobotApi) -> Result<(), Cause> {
+/// The goals of a task in the end. The paper's "proportion of task completed" is `met` of `goals`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Judgement {
+    /// End conditions of the task.
+    pub goals: u32,
+    /// How many of them hold.
+    pub met: u32,
+    /// Why the task is not done, if it is not: [`Cause::EndedEarly`] when a goal does not hold at rest,
+    /// [`Cause::FellWhenCarried`] when it no longer does after the carrying.
+    pub cause: Option<Cause>,
+}
+
+/// Lets the world come to rest and judges it; where all goals hold and the family has a tray, carries it and judges
+/// again.
+pub fn judge(task: &Task, world: &mut dyn RobotApi) -> Judgement {
     let at_rest = world.settle();
-    if !goal_holds(world.scene(), &at_rest, &task.conditions) {
-        return Err(Cause::EndedEarly);
-    }
-    let Some(tray) = task.family.tray() else { return Ok(()) };
+    let at_rest = judged(task, world, &at_rest, Cause::EndedEarly);
+    let Some(tray) = task.family.tray().filter(|_| at_rest.cause.is_none()) else { return at_rest };
     for body in world.scene().slot(tray).bodies.clone() {
         let carried = world.carry(body);
-        if !goal_holds(world.scene(), &carried, &task.conditions) {
-            return Err(Cause::FellWhenCarried);
+        let carried = judged(task, world, &carried, Cause::FellWhenCarried);
+        if carried.cause.is_some() {
+            return carried;
         }
     }
-    Ok(())
+    at_rest
+}
+
+/// A state, with the cause where not all goals hold in it.
+fn judged(task: &Task, world: &dyn RobotApi, state: &SceneState, cause: Cause) -> Judgement {
+    let holds = |condition| condition_holds(world.scene(), state, condition);
+    let goals = task.conditions.len() as u32;
+    let met = task.conditions.iter().filter(|condition| holds(condition)).count() as u32;
+    Judgement { goals, met, cause: (met < goals).then_some(cause) }
 }

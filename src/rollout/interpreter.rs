@@ -9,7 +9,7 @@ use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
 use crate::model::{Decisions, Pictures};
 use crate::program::Program;
-use crate::robot::{Action, RobotApi, judge};
+use crate::robot::{Action, Judgement, RobotApi, judge};
 use crate::rollout::divergence::divergence;
 use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
 use crate::scene::Scene;
@@ -79,6 +79,8 @@ pub struct RolloutEpisode {
     pub fault_decision: Option<u32>,
     /// What an adversary did; `None` in a world without one.
     pub pushes: Option<Vec<Push>>,
+    /// How many goals of the task hold in the end, also where the policy never ended.
+    pub judgement: Judgement,
 }
 
 /// Acts all episodes to their ends. Physics of different episodes runs on the current rayon pool; the result does not
@@ -220,11 +222,10 @@ impl<'t> Running<'t> {
     }
 
     fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
-        let ended = if self.gave_up { Err(Cause::NeverEnded) } else { judge(self.task, self.world.as_mut()) };
-        let outcome = match ended {
-            Ok(()) => Outcome::Success,
-            Err(cause) => Outcome::Failure(self.first_fault.map_or(cause, |(_, fault)| fault)),
-        };
+        let judgement = judge(self.task, self.world.as_mut());
+        let cause = if self.gave_up { Some(Cause::NeverEnded) } else { judgement.cause };
+        let first_cause = |cause| self.first_fault.map_or(cause, |(_, fault)| fault);
+        let outcome = cause.map_or(Outcome::Success, |cause| Outcome::Failure(first_cause(cause)));
         let frame = self.frame();
         let calls = self.calls.finish(frame);
         self.provenance.actor = crate::trace::Actor::Policy(variant.to_owned());
@@ -243,6 +244,7 @@ impl<'t> Running<'t> {
             first_divergence: self.first_divergence,
             fault_decision: self.first_fault.map(|(decision, _)| decision),
             pushes: self.world.pushes().map(<[Push]>::to_vec),
+            judgement,
         })
     }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::rollout::{Divergence, DivergenceKind, RolloutEpisode};
+use crate::rollout::facts::decimal;
+use crate::rollout::{Divergence, DivergenceKind, ModelFacts, RolloutEpisode, SuiteFacts};
 use crate::table::{TableError, TableRows as _, table};
 use crate::trace::Push;
 
@@ -24,10 +25,14 @@ pub struct Acted {
     pub specification: Option<&'static str>,
     /// How scopes are decoded; `None` for an oracle.
     pub decoder: Option<&'static str>,
+    /// The parts of its network; `None` for an oracle.
+    pub model: Option<ModelFacts>,
 }
 
 table! {
     /// `rollouts.parquet` of a suite: a row an episode that a policy acted.
+    ///
+    /// > Why does each row say what its suite and its model are? So that nobody has to read it from their names: figures, claims and queries go by these columns. They are null in files that were written before there were any.
     rollouts {
         /// the model's variant, or `oracle`
         variant: Text,
@@ -71,14 +76,46 @@ table! {
         pushes: OptionalInt64,
         /// bodies that they knocked off what they stood on; null without one
         toppled: OptionalInt64,
+        /// end conditions of the task
+        goals: OptionalInt64 later,
+        /// how many of them hold in the end, at rest; the paper's "proportion of task completed" is this share
+        goals_met: OptionalInt64 later,
+        /// things on the table that may be moved
+        objects: OptionalInt64 later,
+        /// the suite's family of tasks; null where facts were not written down
+        family: OptionalText later,
+        /// blocks within reach; null in a family without blocks
+        blocks: OptionalInt64 later,
+        /// order in which sub-tasks are demonstrated: `own` or `shuffled`
+        order: OptionalText later,
+        /// chance of a push of the adversary after each placement; 0 without one
+        adversary_probability: OptionalFloat64 later,
+        /// impulse of a push in newton seconds; 0 without an adversary
+        adversary_impulse_ns: OptionalFloat64 later,
+        /// fewest instances of a category that the suite demonstrates; null in a family without categories
+        demonstrated_min: OptionalInt64 later,
+        /// most instances of a category that the suite demonstrates
+        demonstrated_max: OptionalInt64 later,
+        /// fewest instances of a category that the suite puts on the table
+        on_table_min: OptionalInt64 later,
+        /// most instances of a category that the suite puts on the table
+        on_table_max: OptionalInt64 later,
+        /// bowls that each task of the suite asks for; null where tasks differ in it or ask for none
+        bowls: OptionalInt64 later,
+        /// how the model remembers the steps of a program call: `reactive` (not at all), `gru` or `lstm`; null for the oracle
+        core: OptionalText later,
+        /// what the model decides of the specification: `scoped` (what a callee may see), `unscoped`, `primitives` (no hierarchy) or `arguments` (no specification); null for the oracle
+        scoping: OptionalText later,
+        /// how the model reads observations; null for the oracle
+        encoder: OptionalText later,
     }
 }
 
 impl RolloutRows {
     /// The rows of a suite's episodes.
-    pub fn of(suite: &str, by: &Acted, rollouts: &[RolloutEpisode]) -> Self {
+    pub fn of(suite: &str, facts: &SuiteFacts, by: &Acted, rollouts: &[RolloutEpisode]) -> Self {
         let mut rows = Rows::default();
-        rollouts.iter().for_each(|rollout| rows.push(row(suite, by, rollout)));
+        rollouts.iter().for_each(|rollout| rows.push(row(suite, facts, by, rollout)));
         Self { rows }
     }
 
@@ -132,8 +169,10 @@ impl RolloutRows {
     }
 }
 
-fn row<'a>(suite: &'a str, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
-    let RolloutEpisode { episode, decisions, first_divergence, fault_decision, pushes } = rollout;
+fn row<'a>(suite: &'a str, facts: &SuiteFacts, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
+    let RolloutEpisode { episode, decisions, first_divergence, fault_decision, pushes, judgement } = rollout;
+    let end = |range: Option<[u16; 2]>, at: usize| range.map(|range| i64::from(range[at]));
+    let part = |get: fn(&ModelFacts) -> &'static str| by.model.as_ref().map(|model| get(model).into());
     let n_toppled = |pushes: &Vec<Push>| pushes.iter().map(|push| push.toppled.len()).sum::<usize>() as i64;
     let provenance = &episode.provenance;
     let last_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
@@ -159,5 +198,21 @@ fn row<'a>(suite: &'a str, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
         fault_decision: fault_decision.map(i64::from),
         pushes: pushes.as_ref().map(|pushes| pushes.len() as i64),
         toppled: pushes.as_ref().map(n_toppled),
+        goals: Some(i64::from(judgement.goals)),
+        goals_met: Some(i64::from(judgement.met)),
+        objects: Some(facts.objects(&episode.scene) as i64),
+        family: Some(facts.family.name().into()),
+        blocks: facts.blocks.map(i64::from),
+        order: Some(facts.order.into()),
+        adversary_probability: Some(decimal(facts.adversary_probability)),
+        adversary_impulse_ns: Some(decimal(facts.adversary_impulse_ns)),
+        demonstrated_min: end(facts.demonstrated, 0),
+        demonstrated_max: end(facts.demonstrated, 1),
+        on_table_min: end(facts.on_table, 0),
+        on_table_max: end(facts.on_table, 1),
+        bowls: facts.bowls.map(i64::from),
+        core: part(|model| model.core),
+        scoping: part(|model| model.scoping),
+        encoder: part(|model| model.encoder),
     }
 }

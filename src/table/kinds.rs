@@ -74,6 +74,8 @@ kinds! {
     OptionalFloat32: Optional Float32, Option<f32> => Option<f32>, optional_float32, same;
     /// A float of eight bytes.
     Float64: Required Float64, f64 => f64, float64, same;
+    /// A float of eight bytes or none.
+    OptionalFloat64: Optional Float64, Option<f64> => Option<f64>, optional_float64, same;
     /// True or false.
     Boolean: Required Boolean, bool => bool, boolean, same;
     /// A text.

@@ -82,8 +82,3 @@ pub fn condition_holds(scene: &Scene, state: &SceneState, condition: &Condition)
         }),
     }
 }
-
-/// Whether all conditions hold.
-pub fn goal_holds(scene: &Scene, state: &SceneState, conditions: &[Condition]) -> bool {
-    conditions.iter().all(|condition| condition_holds(scene, state, condition))
-}
