@@ -19,6 +19,7 @@ mod detections;
 mod error;
 mod eye;
 mod facts;
+mod filmstrips;
 mod gallery;
 mod generate;
 mod layout;

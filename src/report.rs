@@ -15,28 +15,33 @@ mod chart;
 mod claims;
 mod csv;
 mod detections;
+mod facts;
 mod figures;
+mod filmstrip;
 mod frames;
 mod interval;
+mod kind;
 mod markdown;
 mod metrics;
 mod order;
 mod page;
 mod paper;
 mod rollouts;
+mod section;
 mod summary;
-mod tables;
 
 pub use claims::{Claim, Note, Verdict};
 pub use detections::{DetectionError, DetectionsInput, InSight};
+pub use facts::SuiteFacts;
 pub use figures::{Figure, Grid, GridCell, PaperPoint, Point, Series};
+pub use filmstrip::{Filmstrip, Shows, StripPicture};
 pub use interval::{student, wilson};
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
 pub use rollouts::RolloutsInput;
 pub use summary::{
-    Actor, Aggregate, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult,
-    TrainingEnd,
+    Actor, Aggregate, Divergence, Fact, FirstError, InputFile, ModelParts, ModelSummary, Report, StageCost,
+    SuiteResult, TrainingEnd,
 };
 
 use std::path::{Path, PathBuf};
@@ -56,6 +61,8 @@ pub struct ReportInputs {
     pub metrics: Vec<MetricsInput>,
     /// detections.parquet files, in any order.
     pub detections: Vec<DetectionsInput>,
+    /// Episodes in pictures, in the order they are to be shown.
+    pub filmstrips: Vec<Filmstrip>,
     /// What else there is to say of the run, in the order it is to be told.
     pub facts: Vec<Fact>,
     /// What each stage took, as far as it was measured.
@@ -122,7 +129,7 @@ pub enum ReportError {
 
 /// An actor for an error.
 fn told(actor: &Actor) -> String {
-    let Actor { experiment, variant, tag, train_tasks, specification: _, decoder } = actor;
+    let Actor { experiment, variant, parts: _, tag, train_tasks, specification: _, decoder } = actor;
     let mut told = format!("experiment {experiment}, variant {variant}");
     if let Some(tag) = tag {
         told.push_str(&format!(" ({tag})"));
@@ -155,10 +162,11 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         figures: figures::figures(&aggregates),
         grids: figures::grids(&aggregates),
         aggregates,
+        detections: detections::read(&inputs.detections, &rollouts.results)?,
         results: rollouts.results,
         divergences: rollouts.divergences,
         errors: rollouts.errors,
-        detections: detections::read(&inputs.detections)?,
+        filmstrips: inputs.filmstrips.clone(),
         training: metrics::ends(&curves),
         models: inputs.metrics.iter().map(|metrics| metrics.model.clone()).collect(),
         costs: inputs.costs.clone(),

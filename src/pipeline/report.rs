@@ -7,19 +7,22 @@ use serde_json::json;
 use crate::artifact::{FileEntry, IoError, Plan, Receipt};
 use crate::model;
 use crate::pipeline::costs::Costs;
+use crate::pipeline::filmstrips::{self, Rollouts};
 use crate::pipeline::runner::{Context, Options, Part, Unit};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train};
 use crate::render::{CameraConfig, Randomization};
 use crate::report::{
-    self, DetectionsInput, Fact, MetricsInput, ModelSummary, ReportInputs, RolloutsInput, StageCost, paper_values,
+    self, DetectionsInput, Fact, Filmstrip, MetricsInput, ModelParts, ModelSummary, ReportInputs, RolloutsInput,
+    StageCost, paper_values,
 };
+use crate::rollout::ModelFacts;
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
 /// What a report holds.
 const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
 /// Version of what a report says, beside that of the program.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
     let mut inputs = BTreeMap::new();
@@ -31,7 +34,7 @@ pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
 
 pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
     let mut inputs = ReportInputs { title: title(context.pipeline).to_owned(), ..ReportInputs::default() };
-    gather(context, &mut inputs)?;
+    gather(context, context.dir, &mut inputs)?;
     write(unit, inputs)
 }
 
@@ -50,8 +53,8 @@ pub(super) fn study_units(study: &Study, dir: &RunDir, options: &Options) -> Res
 pub(super) fn work_study(study: &Study, dir: &RunDir, options: &Options, unit: &Unit) -> Result<(), PipelineError> {
     let mut inputs = ReportInputs { title: study.title().to_owned(), ..ReportInputs::default() };
     for pipeline in &study.experiments {
-        let dir = dir.experiment(&pipeline.spec.name);
-        gather(&Context { pipeline, dir: &dir, options }, &mut inputs)?;
+        let own = dir.experiment(&pipeline.spec.name);
+        gather(&Context { pipeline, dir: &own, options }, dir, &mut inputs)?;
     }
     write(unit, inputs)
 }
@@ -78,8 +81,8 @@ fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
     Ok(())
 }
 
-/// Adds all that is known of one experiment.
-fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
+/// Adds all that is known of one experiment; `run` is the run directory of the report.
+fn gather(context: &Context<'_>, run: &RunDir, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
     let experiment = &context.pipeline.spec.name;
     let rollouts = rollout::units(context)?;
     inputs.rollouts.extend(rollouts.iter().map(|unit| RolloutsInput {
@@ -93,11 +96,29 @@ fn gather(context: &Context<'_>, inputs: &mut ReportInputs) -> Result<(), Pipeli
             inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
         }
     }
+    inputs.filmstrips.extend(filmstrips(context, run, &rollouts)?);
     let costs = Costs::read(context.dir)?;
     inputs.metrics.extend(trainings(context, &costs)?);
     inputs.facts.extend(facts(context)?);
     inputs.costs.extend(stage_costs(context, &costs, &mut inputs.commits)?);
     Ok(())
+}
+
+/// Strips of what models acted; of the oracle only where there is nothing else.
+fn filmstrips(context: &Context<'_>, run: &RunDir, rollouts: &[Unit]) -> Result<Vec<Filmstrip>, PipelineError> {
+    let (task_set, _) = tasks::read(context)?;
+    let spec = &context.pipeline.spec;
+    let of_unit = |unit: &Unit| {
+        let Part::Suite { actor, suite } = unit.part else { return None };
+        let place = unit.dir.path().strip_prefix(run.root()).unwrap_or(unit.dir.path()).display().to_string();
+        let actor = rollout::actor_name(context, actor);
+        Some(Rollouts { suite: spec.rollout.suites[suite].name.clone(), actor, dir: unit.dir.clone(), place })
+    };
+    let is_model = |unit: &&Unit| !matches!(unit.part, Part::Suite { actor: None, .. });
+    let (models, oracle): (Vec<&Unit>, Vec<&Unit>) = rollouts.iter().partition(is_model);
+    let shown = if models.is_empty() { oracle } else { models };
+    let shown: Vec<Rollouts> = shown.into_iter().filter_map(of_unit).collect();
+    filmstrips::of_experiment(&spec.name, &task_set, &shown)
 }
 
 /// The tag of the model that acts in a unit of the rollout stage.
@@ -116,6 +137,7 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         let model = ModelSummary {
             experiment: context.pipeline.spec.name.clone(),
             variant: spec.variant.name().to_owned(),
+            parts: parts(ModelFacts::from(spec.variant)),
             tag: spec.tag.clone(),
             train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
             specification: spec.specification().name().to_owned(),
@@ -126,6 +148,12 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         trainings.push(MetricsInput { model, path: unit.dir.path().join(METRICS_FILE) });
     }
     Ok(trainings)
+}
+
+fn parts(facts: ModelFacts) -> ModelParts {
+    let ModelFacts { core, scoping, encoder } = facts;
+    let [core, scoping, encoder] = [core, scoping, encoder].map(|name| Some(name.to_owned()));
+    ModelParts { core, scoping, encoder }
 }
 
 /// What the stages before the report took, as far as it was measured under the plans that hold now.

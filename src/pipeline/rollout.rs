@@ -10,6 +10,7 @@ use crate::artifact::{FileEntry, Plan, Receipt};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
+use crate::pipeline::filmstrips::MOST_FAILURES;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
@@ -86,7 +87,7 @@ fn actors(context: &Context<'_>) -> Vec<Option<ModelActor>> {
 }
 
 /// The folder of an actor's rollouts.
-fn actor_name(context: &Context<'_>, actor: Option<ModelActor>) -> String {
+pub(super) fn actor_name(context: &Context<'_>, actor: Option<ModelActor>) -> String {
     let Some(ModelActor { model, seed, decoder }) = actor else { return "oracle".to_owned() };
     let spec = &context.pipeline.spec.models[model];
     format!("{}-{}", model_name(spec, seed), decoder.name())
@@ -264,7 +265,8 @@ impl Suite<'_> {
         let detections = self.detections(policy.as_ref(), &by, &starts);
         let acted = self.act(policy.as_mut(), starts)?;
         let part = format!("{PART}{shard:05}.parquet");
-        RolloutRows::of(&spec.name, &facts::of_suite(&context.pipeline.spec, spec), &by, &acted).write(&unit.dir.path().join(&part))?;
+        RolloutRows::of(&spec.name, &facts::of_suite(&context.pipeline.spec, spec), &by, &acted)
+            .write(&unit.dir.path().join(&part))?;
         let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
         if let Some(detections) = detections {
             let part = format!("{DETECTIONS_PART}{shard:05}.parquet");
@@ -354,20 +356,34 @@ impl Suite<'_> {
         })
     }
 
-    /// Records the first episodes of the suite.
+    /// Records the first episodes of the suite, and the shard's first failures, which are not seen otherwise.
     fn record(&self, shard: u32, acted: &[RolloutEpisode]) -> Result<Option<FileEntry>, PipelineError> {
-        let n_recorded = self.context.pipeline.spec.rollout.record.saturating_sub(shard * EPISODES_PER_SHARD);
-        if n_recorded == 0 {
+        let recorded = self.recorded(shard, acted);
+        if recorded.is_empty() {
             return Ok(None);
         }
         let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", self.unit.plan.shards);
         let plan_json = serde_json::to_string(&self.unit.plan).unwrap_or_default();
         let writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
         let mut writer = writer.with_cameras(&self.context.pipeline.spec.generate.cameras);
-        for rollout in acted.iter().take(n_recorded as usize) {
+        for rollout in recorded {
             writer.write(&rollout.episode)?;
         }
         writer.finish()?;
         Ok(Some(FileEntry::of(self.unit.dir.path(), &name)?))
+    }
+
+    /// The episodes of a shard that are recorded, in order; none where nothing is to be recorded.
+    fn recorded<'e>(&self, shard: u32, acted: &'e [RolloutEpisode]) -> Vec<&'e RolloutEpisode> {
+        let record = self.context.pipeline.spec.rollout.record;
+        let n_first = record.saturating_sub(shard * EPISODES_PER_SHARD) as usize;
+        let mut n_failures = if record == 0 { 0 } else { MOST_FAILURES };
+        let mut is_recorded = |(at, rollout): &(usize, &RolloutEpisode)| {
+            let is_failure = n_failures > 0 && !rollout.episode.outcome.is_success();
+            n_failures -= usize::from(is_failure);
+            is_failure || *at < n_first
+        };
+        let recorded = acted.iter().enumerate().filter(|found| is_recorded(found));
+        recorded.map(|(_, rollout)| rollout).collect()
     }
 }

@@ -3,11 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use polars::prelude::{IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, UnionArgs, concat, lit};
+use polars::prelude::{
+    IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, SchemaRef, UnionArgs, concat, lit,
+};
 use serde::Serialize;
 
 use crate::dataset;
 use crate::query::QueryError;
+
+/// The table whose columns have become more.
+const ROLLOUTS: &str = "rollouts";
 
 /// Tables by name, each of any number of files.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +51,7 @@ impl Tables {
 
     /// Adds a `rollouts.parquet`.
     pub fn add_rollouts(&mut self, path: &Path) {
-        self.add("rollouts", path.to_owned(), None);
+        self.add(ROLLOUTS, path.to_owned(), None);
     }
 
     /// Adds a `detections.parquet`.
@@ -91,15 +96,24 @@ impl Tables {
 
     /// Opens every table; no row is read.
     pub(super) fn scan(&self) -> Result<Vec<(&'static str, LazyFrame)>, QueryError> {
-        self.0.iter().map(|(&name, sources)| Ok((name, union(sources)?))).collect()
+        let frame = |name: &'static str, sources: &[Source]| match name {
+            ROLLOUTS => scan_rollouts(sources).map_err(|source| unreadable(sources, source)),
+            _ => union(sources),
+        };
+        self.0.iter().map(|(&name, sources)| Ok((name, frame(name, sources)?))).collect()
     }
+}
+
+/// A table that Polars cannot open, by its first file.
+fn unreadable(sources: &[Source], source: PolarsError) -> QueryError {
+    let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
+    QueryError::Table { path, source }
 }
 
 /// The files of a table as one. Where they do not say which model they are of, they are read at once: learning curves
 /// are short, and Polars cannot count the rows of a union of lazy frames without its 128-bit numbers.
 fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
-    let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
-    let unreadable = |source: PolarsError| QueryError::Table { path: path.clone(), source };
+    let unreadable = |source| unreadable(sources, source);
     if sources.iter().all(|source| source.model.is_none()) {
         return scan(sources.iter().map(|source| source.path.as_path())).map_err(unreadable);
     }
@@ -113,8 +127,22 @@ fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
 }
 
 fn scan<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Result<LazyFrame, PolarsError> {
-    let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
     let paths = paths.into_iter().map(PlRefPath::try_from_path).collect::<Result<Vec<_>, _>>()?;
+    open(paths, None)
+}
+
+/// Rollouts of several versions of this program as one table: a column that a file lacks is null there.
+fn scan_rollouts(sources: &[Source]) -> Result<LazyFrame, PolarsError> {
+    let paths = sources.iter().map(|source| PlRefPath::try_from_path(&source.path)).collect::<Result<Vec<_>, _>>()?;
+    let schemas = paths.iter().map(|path| open(vec![path.clone()], None)?.collect_schema());
+    let widest = schemas.collect::<Result<Vec<_>, _>>()?.into_iter().max_by_key(|schema| schema.len());
+    open(paths, widest)
+}
+
+/// Files as one table, of the first one's columns or of those that are given.
+fn open(paths: Vec<PlRefPath>, schema: Option<SchemaRef>) -> Result<LazyFrame, PolarsError> {
+    let allow_missing_columns = schema.is_some();
+    let options = ScanArgsParquet { glob: false, schema, allow_missing_columns, ..ScanArgsParquet::default() };
     let mut frame = LazyFrame::scan_parquet_files(paths.into(), options)?;
     frame.collect_schema()?;
     Ok(frame)

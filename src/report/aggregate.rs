@@ -9,22 +9,14 @@ use crate::report::summary::{Aggregate, SuiteResult};
 /// Sums results over training seeds. They stand sorted, so those of one actor and suite are neighbours.
 pub(super) fn aggregates(results: &[SuiteResult], paper: &[PaperValue]) -> Vec<Aggregate> {
     let same = |a: &SuiteResult, b: &SuiteResult| (&a.actor, &a.suite) == (&b.actor, &b.suite);
-    let most_tasks = |of: &SuiteResult| {
-        let own = |other: &&SuiteResult| {
-            other.suite == of.suite
-                && (&other.actor.experiment, other.actor.model()) == (&of.actor.experiment, of.actor.model())
-        };
-        results.iter().filter(own).map(|result| result.actor.train_tasks).max()
-    };
-    let of_seeds = |seeds: &[SuiteResult]| {
-        // The paper's figures are of its largest numbers of tasks.
-        let has_most = most_tasks(&seeds[0]) == Some(seeds[0].actor.train_tasks);
-        aggregate(seeds, if has_most { paper } else { &[] })
-    };
-    results.chunk_by(same).map(of_seeds).collect()
+    let mut aggregates: Vec<Aggregate> = results.chunk_by(same).map(aggregate).collect();
+    for row in &mut aggregates {
+        row.paper_success_rate = paper.iter().find(|value| value.is_met_by(row)).map(|value| value.success_rate);
+    }
+    aggregates
 }
 
-fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
+fn aggregate(seeds: &[SuiteResult]) -> Aggregate {
     let (actor, suite) = (seeds[0].actor.clone(), seeds[0].suite.clone());
     let rates: Vec<f64> = seeds.iter().map(|seed| seed.success_rate).collect();
     let of_seeds = student(&rates);
@@ -36,13 +28,13 @@ fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
     for (cause, count) in seeds.iter().flat_map(|seed| &seed.causes) {
         *causes.entry(cause.clone()).or_default() += count;
     }
-    let paper_success_rate = paper
-        .iter()
-        .find(|value| actor.is_the_papers() && value.is_for(&actor.variant, &suite))
-        .map(|value| value.success_rate);
+    let goals_met: Option<Vec<f64>> = seeds.iter().map(|seed| seed.goals_met).collect();
+    // Where seeds differ in what they were asked, nothing is known of it.
+    let facts = seeds.iter().all(|seed| seed.facts == seeds[0].facts).then(|| seeds[0].facts.clone());
     Aggregate {
         actor,
         suite,
+        facts: facts.unwrap_or_default(),
         seeds: seeds.len() as u64,
         episodes,
         successes,
@@ -53,9 +45,10 @@ fn aggregate(seeds: &[SuiteResult], paper: &[PaperValue]) -> Aggregate {
         seeds_high: of_seeds.map(|(_, high)| high),
         wilson_low,
         wilson_high,
+        goals_met: goals_met.map(|shares| shares.iter().sum::<f64>() / shares.len() as f64),
         causes,
         pushes: sum(|seed| seed.pushes),
         toppled: sum(|seed| seed.toppled),
-        paper_success_rate,
+        paper_success_rate: None,
     }
 }

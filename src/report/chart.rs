@@ -12,11 +12,9 @@ pub(super) mod scale;
 
 use serde::Serialize;
 
-use crate::report::order;
+use crate::report::summary::{Actor, ModelParts};
 
-/// How many colours the style sheet has for variants.
-const N_VARIANT_COLORS: usize = 11;
-/// How many others it has for causes and kinds.
+/// How many colours the style sheet has for causes and kinds, beside those for models.
 pub(super) const N_COLORS: usize = 8;
 
 /// A mark on an axis.
@@ -37,15 +35,10 @@ pub(in crate::report) struct Key {
 }
 
 impl Key {
-    /// A variant's line.
-    pub(in crate::report) fn of_variant(variant: &str) -> Self {
-        Self { label: variant.to_owned(), color: color_of(variant), hollow: has_paper_encoder(variant) }
+    /// The line of a model that was trained.
+    pub(in crate::report) fn of_model(variant: &str, parts: &ModelParts) -> Self {
+        Self { label: variant.to_owned(), color: parts.color(false), hollow: parts.has_papers_encoder() }
     }
-}
-
-/// Whether a variant sees the paper's flattened input; the others compare objects.
-pub(in crate::report) fn has_paper_encoder(variant: &str) -> bool {
-    variant.ends_with("_paper")
 }
 
 /// A panel's size and the rectangle in it that data is drawn in.
@@ -75,9 +68,19 @@ impl Panel {
     }
 }
 
-/// The colour of a variant: the same in every report, and for both encoders.
-pub(in crate::report) fn color_of(variant: &str) -> usize {
-    order::variant_rank(variant) % N_VARIANT_COLORS
+/// The colour of an actor's kind.
+pub(in crate::report) fn color_of(actor: &Actor) -> usize {
+    actor.parts.color(actor.is_oracle())
+}
+
+/// Lines in order of appearance, of those that are alike the first.
+pub(in crate::report) fn once_each(keys: impl Iterator<Item = Key>, are_alike: fn(&Key, &Key) -> bool) -> Vec<Key> {
+    keys.fold(Vec::new(), |mut kept, key| {
+        if !kept.iter().any(|other| are_alike(other, &key)) {
+            kept.push(key);
+        }
+        kept
+    })
 }
 
 /// Names as they are in order of appearance, each once.

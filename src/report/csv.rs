@@ -3,6 +3,7 @@
 use polars::prelude::{CsvWriter, DataFrame, SerWriter as _, df};
 
 use crate::report::ReportError;
+use crate::report::facts::SuiteFacts;
 use crate::report::metrics::{Curve, PARTS};
 use crate::report::summary::SuiteResult;
 
@@ -14,23 +15,42 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
     let text = |of: fn(&SuiteResult) -> &str| results.iter().map(of).collect::<Vec<_>>();
     let maybe = |of: fn(&SuiteResult) -> Option<&str>| results.iter().map(of).collect::<Vec<_>>();
     let real = |of: fn(&SuiteResult) -> f64| results.iter().map(of).collect::<Vec<_>>();
+    let share = |of: fn(&SuiteResult) -> Option<f64>| results.iter().map(of).collect::<Vec<_>>();
+    let fact = |of: fn(&SuiteFacts) -> Option<i64>| results.iter().map(|result| of(&result.facts)).collect::<Vec<_>>();
     let whole = |of: fn(&SuiteResult) -> u64| results.iter().map(of).collect::<Vec<_>>();
     let cause = |(cause, count): (&String, &u64)| format!("{cause}={count}");
     let causes = |result: &SuiteResult| result.causes.iter().map(cause).collect::<Vec<_>>().join(";");
     let table = df!(
         "experiment" => text(|result| &result.actor.experiment),
         "variant" => text(|result| &result.actor.variant),
+        "core" => maybe(|result| result.actor.parts.core.as_deref()),
+        "scoping" => maybe(|result| result.actor.parts.scoping.as_deref()),
+        "encoder" => maybe(|result| result.actor.parts.encoder.as_deref()),
         "tag" => maybe(|result| result.actor.tag.as_deref()),
         "train_tasks" => results.iter().map(|result| result.actor.train_tasks).collect::<Vec<_>>(),
         "specification" => maybe(|result| result.actor.specification.as_deref()),
         "decoder" => maybe(|result| result.actor.decoder.as_deref()),
         "suite" => text(|result| &result.suite),
+        "family" => maybe(|result| result.facts.family.as_deref()),
+        "split" => maybe(|result| result.facts.split.as_deref()),
+        "blocks" => fact(|facts| facts.blocks),
+        "order" => maybe(|result| result.facts.order.as_deref()),
+        "adversary_probability" => share(|result| result.facts.adversary_probability),
+        "adversary_impulse_ns" => share(|result| result.facts.adversary_impulse_ns),
+        "demonstrated_min" => fact(|facts| facts.demonstrated_min),
+        "demonstrated_max" => fact(|facts| facts.demonstrated_max),
+        "on_table_min" => fact(|facts| facts.on_table_min),
+        "on_table_max" => fact(|facts| facts.on_table_max),
+        "bowls" => fact(|facts| facts.bowls),
+        "objects_min" => fact(|facts| facts.objects_min),
+        "objects_max" => fact(|facts| facts.objects_max),
         "seed" => results.iter().map(|result| result.seed).collect::<Vec<_>>(),
         "episodes" => whole(|result| result.episodes),
         "successes" => whole(|result| result.successes),
         "success_rate" => real(|result| result.success_rate),
         "wilson_low" => real(|result| result.wilson_low),
         "wilson_high" => real(|result| result.wilson_high),
+        "goals_met" => share(|result| result.goals_met),
         "causes" => results.iter().map(causes).collect::<Vec<_>>(),
         "mean_calls" => real(|result| result.mean_calls),
         "mean_sim_secs" => real(|result| result.mean_sim_secs),

@@ -15,7 +15,10 @@ use polars::prelude::DataType;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::facts::BLOCK_STACKING;
 use crate::report::frames::{Rows, collect, scan};
+use crate::report::paper::{DETECTOR_BLOCKS, DETECTOR_DEVIATION_CM};
+use crate::report::summary::{ModelParts, SuiteResult};
 use crate::report::{ReportError, order};
 
 const COLUMNS: [(&str, DataType); 8] = [
@@ -35,8 +38,8 @@ const FULL_SHARE: f64 = 0.75;
 const HIDDEN_SHARE: f64 = 0.25;
 const MICROMETRES: f64 = 1e6;
 const PER_CM: f64 = 1e4;
-/// The paper's deviation, and what counts as a large error.
-const PAPER_CM: f64 = 2.0;
+/// What counts as a large error.
+const LARGE_CM: f64 = 2.0;
 
 /// The detections of one model in one suite.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,6 +91,9 @@ pub struct DetectionError {
     pub experiment: String,
     /// The variant of the model behind it.
     pub variant: String,
+    /// Its parts.
+    #[serde(flatten)]
+    pub parts: ModelParts,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
     /// The set of evaluation tasks.
@@ -110,8 +116,8 @@ pub struct DetectionError {
     pub percentile_99_cm: f64,
     /// Share of distances above two centimetres.
     pub over_2_cm: f64,
-    /// The paper's standard deviation, in centimetres.
-    pub paper_deviation_cm: f64,
+    /// The paper's standard deviation, in centimetres; null where there are not its eight blocks.
+    pub paper_deviation_cm: Option<f64>,
 }
 
 /// What tells rows of the result apart, in their order.
@@ -128,8 +134,8 @@ struct Errors {
     square_sums: [i128; 3],
 }
 
-/// Reads and sums up; nothing when there are no files.
-pub(super) fn read(inputs: &[DetectionsInput]) -> Result<Vec<DetectionError>, ReportError> {
+/// Reads and sums up; nothing when there are no files. What suites ask for and models are, their results say.
+pub(super) fn read(inputs: &[DetectionsInput], results: &[SuiteResult]) -> Result<Vec<DetectionError>, ReportError> {
     let mut by_key: BTreeMap<Key, Errors> = BTreeMap::new();
     for input in inputs {
         let table = collect(scan(&input.path, &COLUMNS)?, std::slice::from_ref(&input.path))?;
@@ -147,11 +153,28 @@ pub(super) fn read(inputs: &[DetectionsInput]) -> Result<Vec<DetectionError>, Re
         }
     }
     let mut errors: Vec<DetectionError> = by_key.into_iter().map(|(key, errors)| errors.summed(key)).collect();
+    for error in &mut errors {
+        let own = |result: &&SuiteResult| {
+            let actor = &result.actor;
+            (&actor.experiment, &actor.variant, &result.suite) == (&error.experiment, &error.variant, &error.suite)
+        };
+        let Some(result) = results.iter().find(own) else { continue };
+        error.parts = result.actor.parts.clone();
+        error.paper_deviation_cm = is_the_papers(result).then_some(DETECTOR_DEVIATION_CM);
+    }
+    let place_of = |suite: &str| results.iter().position(|result| result.suite == suite);
     errors.sort_by_cached_key(|error| {
-        let suite = order::suite(&error.suite);
-        (suite, error.experiment.clone(), order::variant(&error.variant), -error.train_tasks, error.in_sight)
+        let model = order::model(&error.variant, &error.parts, false);
+        let suite = (place_of(&error.suite), error.suite.clone());
+        (suite, error.experiment.clone(), model, -error.train_tasks, error.in_sight)
     });
     Ok(errors)
+}
+
+/// Whether the paper's detector looked for the same things.
+fn is_the_papers(result: &SuiteResult) -> bool {
+    let is_family = result.facts.family.as_deref() == Some(BLOCK_STACKING);
+    is_family && result.facts.blocks == Some(DETECTOR_BLOCKS)
 }
 
 impl Errors {
@@ -179,10 +202,11 @@ impl Errors {
             cm(self.distances.get(position - 1).copied().unwrap_or_default() as f64)
         };
         let variance = |axis: usize| self.square_sums[axis] as f64 / n - (self.sums[axis] as f64 / n).powi(2);
-        let over = self.distances.iter().filter(|&&distance| cm(distance as f64) > PAPER_CM).count();
+        let over = self.distances.iter().filter(|&&distance| cm(distance as f64) > LARGE_CM).count();
         DetectionError {
             experiment,
             variant,
+            parts: ModelParts::default(),
             train_tasks,
             suite,
             seeds: self.seeds.len() as u64,
@@ -194,7 +218,7 @@ impl Errors {
             percentile_95_cm: percentile(0.95),
             percentile_99_cm: percentile(0.99),
             over_2_cm: over as f64 / n,
-            paper_deviation_cm: PAPER_CM,
+            paper_deviation_cm: None,
         }
     }
 }

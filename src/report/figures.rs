@@ -1,27 +1,25 @@
 //! The paper's figures from our rollouts: success over the length of tasks, the number of training tasks, the strength
-//! of an adversary, and the objects on a table.
+//! of an adversary, and the objects on a table. A figure is an entry of [`DEFINITIONS`] and nothing else.
 //!
-//! # Input and output
+//! # Invariants
 //!
-//! Suites are known by their names: `sorting_unseen_<objects>`, `stacking_unseen`, `stacking_seen`,
-//! `stacking_topology`, `stacking_adversary` (25 %), `stacking_adversary_p<percent>`, `cleanup_unseen_<bowls>_<forks>`.
-//! Of several decoders of a model the one that stands for it is shown ([`order::DECODERS`]).
-//!
-//! # Source
-//!
-//! The paper's own points are those that its text and tables give in numbers; its plots are not read off.
+//! A figure is of one experiment. What a row is and where it stands follows from its facts. Of several decoders of a
+//! model the one that stands for it is shown ([`order::DECODERS`]). A point of the paper stands beside one of ours that
+//! meets its conditions ([`crate::report::paper`]), and nowhere else.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::chart::distinct;
-use crate::report::claims::SIGHTED;
+use crate::report::facts::{Ask, BLOCK_STACKING, OBJECT_SORTING, TABLE_CLEANUP};
+use crate::report::kind::{Design, Sight};
 use crate::report::order;
-use crate::report::summary::Aggregate;
+use crate::report::summary::{Aggregate, ModelParts};
 
 /// Success over some quantity, ours and the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Figure {
+    /// Of which experiment.
+    pub experiment: String,
     /// Its name in files.
     pub id: String,
     /// Its name for people.
@@ -39,9 +37,12 @@ pub struct Figure {
 pub struct Series {
     /// The variant.
     pub variant: String,
+    /// Its parts.
+    #[serde(flatten)]
+    pub parts: ModelParts,
     /// Ours, by rising quantity.
     pub ours: Vec<Point>,
-    /// The paper's; empty where it gives no number.
+    /// The paper's, beside those of ours that meet its conditions.
     pub paper: Vec<PaperPoint>,
 }
 
@@ -74,6 +75,8 @@ pub struct PaperPoint {
 /// Success over two quantities.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Grid {
+    /// Of which experiment.
+    pub experiment: String,
     /// The variant.
     pub variant: String,
     /// One for each cell that was measured, by rows.
@@ -101,13 +104,11 @@ struct Definition {
     source: &'static str,
     /// The quantity of a row; `None` where the row is not in the figure.
     x: fn(&Aggregate) -> Option<i64>,
-    /// With fewer quantities there is nothing to see.
-    least_positions: usize,
-    paper: &'static [(&'static str, i64, f64)],
+    /// Whether the quantity is the number of training tasks. In other figures a variant is shown after the most alone.
+    is_over_tasks: bool,
+    /// What must be there for the figure to say anything.
+    is_worth_it: fn(&Figure) -> bool,
 }
-
-/// The figure of models that see, which is left out where there are none.
-const PICTURES: &str = "stacking_pictures";
 
 const DEFINITIONS: [Definition; 7] = [
     Definition {
@@ -115,201 +116,188 @@ const DEFINITIONS: [Definition; 7] = [
         title: "Object Sorting: length",
         x_label: "objects on the table",
         source: "Experiment 1: NTP over 90 % from 4 to 40 objects; flat models from around 40 % to around 25 %",
-        x: sorting_length,
-        least_positions: 2,
-        paper: &[("ntp", 4, 0.90), ("ntp", 40, 0.90), ("flat", 4, 0.40), ("flat", 40, 0.25)],
+        x: |row| row.facts.objects().filter(|_| asks(row, OBJECT_SORTING, Ask::Unseen) && is_shown(row)),
+        is_over_tasks: false,
+        is_worth_it: two_places,
     },
     Definition {
         id: "stacking_unseen",
         title: "Block Stacking: unseen end configurations",
         x_label: "training tasks",
         source: "Experiment 2 and table \u{201c}Adversarial Dynamics\u{201d}, no failure: 0.863 and 0.884 with 1000 tasks",
-        x: stacking_unseen,
-        least_positions: 2,
-        paper: &[("ntp", 1000, 0.863), ("ntp_gru", 1000, 0.884)],
+        x: |row| trained(row, Ask::Unseen).filter(|_| !row.actor.parts.sees()),
+        is_over_tasks: true,
+        is_worth_it: two_places,
     },
     Definition {
-        id: PICTURES,
+        id: "stacking_pictures",
         title: "Block Stacking: from pictures, unseen end configurations",
         x_label: "training tasks",
         source: "Experiment 4: full state above end to end above the detector; the text gives no number",
-        x: stacking_pictures,
-        least_positions: 2,
-        paper: &[],
+        x: |row| trained(row, Ask::Unseen).filter(|_| row.actor.parts.is(Design::NTP)),
+        is_over_tasks: true,
+        is_worth_it: |figure| two_places(figure) && figure.series.iter().any(|series| series.parts.sees()),
     },
     Definition {
         id: "stacking_seen",
         title: "Block Stacking: seen end configurations",
         x_label: "training tasks",
         source: "Experiment 2: all but Flat around 85 %",
-        x: stacking_seen,
-        least_positions: 2,
-        paper: &[("ntp", 1000, 0.85), ("ntp_gru", 1000, 0.85), ("ntp_no_scope", 1000, 0.85), ("flat_gru", 1000, 0.85)],
+        x: |row| trained(row, Ask::Seen),
+        is_over_tasks: true,
+        is_worth_it: two_places,
     },
     Definition {
         id: "stacking_topology",
         title: "Block Stacking: towers in another order",
         x_label: "training tasks",
         source: "Experiment 2, task topology; the text gives no number",
-        x: stacking_topology,
-        least_positions: 2,
-        paper: &[],
+        x: |row| trained(row, Ask::Topology),
+        is_over_tasks: true,
+        is_worth_it: two_places,
     },
     Definition {
         id: "stacking_adversary",
         title: "Block Stacking: adversary",
         x_label: "chance of a push after each placement, %",
         source: "Table \u{201c}Adversarial Dynamics\u{201d}: 0.863 to 0.663, with a GRU 0.884 to 0.422",
-        x: adversary,
-        least_positions: 2,
-        paper: &[("ntp", 0, 0.863), ("ntp", 25, 0.663), ("ntp_gru", 0, 0.884), ("ntp_gru", 25, 0.422)],
+        x: |row| pushed(row, |_, mns| mns == USUAL_PUSH.1).map(|(percent, _)| percent),
+        is_over_tasks: false,
+        is_worth_it: two_places,
     },
     Definition {
         id: "stacking_adversary_force",
         title: "Block Stacking: force of the adversary",
         x_label: "impulse of a push at 25 %, mN\u{202f}s",
         source: "Ours; the paper gives no force",
-        x: force,
-        least_positions: 3,
-        paper: &[],
+        x: |row| pushed(row, |percent, _| percent == USUAL_PUSH.0).map(|(_, mns)| mns),
+        is_over_tasks: false,
+        is_worth_it: |figure| n_places(figure) >= 3,
     },
 ];
 
-/// Full state, and the models that see.
-fn stacking_pictures(row: &Aggregate) -> Option<i64> {
-    let is_shown = sees(row) || STATES.contains(&row.actor.variant.as_str());
-    row.actor.train_tasks.filter(|_| is_shown && row.suite == "stacking_unseen")
+/// The paper's chance of a push in percent, and the simulator's usual impulse in millinewton seconds.
+pub(super) const USUAL_PUSH: (i64, i64) = (25, 60);
+
+fn asks(row: &Aggregate, family: &'static str, ask: Ask) -> bool {
+    row.facts.asks(family, ask)
 }
 
-/// What models that see are set beside.
-const STATES: [&str; 2] = ["ntp", "ntp_paper"];
-
-fn sees(row: &Aggregate) -> bool {
-    row.actor.variant.starts_with(SIGHTED)
+/// Whether as much is on the table as in the demonstration.
+fn is_shown(row: &Aggregate) -> bool {
+    row.facts.shows_what_is_there()
 }
 
-fn sorting_length(row: &Aggregate) -> Option<i64> {
-    row.suite.strip_prefix("sorting_unseen_")?.parse().ok()
+/// The training tasks of a row of Block Stacking.
+fn trained(row: &Aggregate, ask: Ask) -> Option<i64> {
+    row.actor.train_tasks.filter(|_| asks(row, BLOCK_STACKING, ask))
 }
 
-fn stacking_unseen(row: &Aggregate) -> Option<i64> {
-    row.actor.train_tasks.filter(|_| row.suite == "stacking_unseen" && !sees(row))
+/// Chance and impulse of the pushes in a row of Block Stacking: those that are asked for, and none at all.
+fn pushed(row: &Aggregate, is_asked_for: fn(i64, i64) -> bool) -> Option<(i64, i64)> {
+    let (percent, mns) = row.facts.push_percent().zip(row.facts.push_mns())?;
+    let is_in = asks(row, BLOCK_STACKING, Ask::Unseen)
+        || asks(row, BLOCK_STACKING, Ask::Adversary) && is_asked_for(percent, mns);
+    let sees = row.actor.parts.sight() != Some(Sight::Positions);
+    is_in.then_some((percent, mns)).filter(|_| !sees)
 }
 
-fn stacking_seen(row: &Aggregate) -> Option<i64> {
-    row.actor.train_tasks.filter(|_| row.suite == "stacking_seen")
+/// How many quantities have a point.
+fn n_places(figure: &Figure) -> usize {
+    let mut places: Vec<i64> = figure.series.iter().flat_map(|series| &series.ours).map(|point| point.x).collect();
+    places.sort_unstable();
+    places.dedup();
+    places.len()
 }
 
-fn stacking_topology(row: &Aggregate) -> Option<i64> {
-    row.actor.train_tasks.filter(|_| row.suite == "stacking_topology")
+/// With one there is nothing to see.
+fn two_places(figure: &Figure) -> bool {
+    n_places(figure) >= 2
 }
 
-/// Unseen tasks without an adversary count as 0 %.
-fn adversary(row: &Aggregate) -> Option<i64> {
-    match row.suite.as_str() {
-        "stacking_unseen" => Some(0),
-        "stacking_adversary" => Some(25),
-        suite => suite.strip_prefix("stacking_adversary_p")?.parse().ok(),
-    }
-}
-
-/// The default impulse is 60 mN s.
-fn force(row: &Aggregate) -> Option<i64> {
-    match row.suite.as_str() {
-        "stacking_unseen" => Some(0),
-        "stacking_adversary" => Some(60),
-        suite => suite.strip_prefix("stacking_adversary_")?.strip_suffix("_mns")?.parse().ok(),
-    }
-}
-
-/// Those figures that our rollouts have enough points of.
+/// Those figures of each experiment that its rollouts have enough points of.
 pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
-    let figures = DEFINITIONS.iter().map(|definition| (definition, figure(definition, aggregates)));
-    let sees = |series: &Series| series.variant.starts_with(SIGHTED);
-    let figures = figures.filter(|(_, figure)| figure.id != PICTURES || figure.series.iter().any(sees));
-    let shown = figures.filter(|(definition, figure)| n_positions(figure) >= definition.least_positions);
-    shown.map(|(_, figure)| figure).collect()
+    let experiments = experiments(aggregates);
+    let of_definition = |definition: &'static Definition| {
+        let figures = experiments.iter().map(|rows| figure(definition, rows));
+        figures.filter(|figure| (definition.is_worth_it)(figure)).collect::<Vec<_>>()
+    };
+    DEFINITIONS.iter().flat_map(of_definition).collect()
 }
 
-fn n_positions(figure: &Figure) -> usize {
-    let mut positions: Vec<i64> = figure.series.iter().flat_map(|series| &series.ours).map(|point| point.x).collect();
-    positions.sort_unstable();
-    positions.dedup();
-    positions.len()
+/// The rows of each experiment that stand for a model of the paper, in order of models: of each the most training tasks
+/// and the first decoder come first.
+pub(super) fn experiments(aggregates: &[Aggregate]) -> Vec<Vec<&Aggregate>> {
+    let stands = |row: &&Aggregate| row.actor.is_the_papers() && !row.actor.is_oracle();
+    let mut rows: Vec<&Aggregate> = aggregates.iter().filter(stands).collect();
+    rows.sort_by_cached_key(|row| (order::actor(&row.actor), order::suite(&row.suite, &row.facts)));
+    rows.chunk_by(|a, b| a.actor.experiment == b.actor.experiment).map(<[_]>::to_vec).collect()
 }
 
-fn figure(definition: &Definition, aggregates: &[Aggregate]) -> Figure {
-    let rows: Vec<(i64, &Aggregate)> = aggregates
-        .iter()
-        .filter(|row| row.actor.is_the_papers())
-        .filter_map(|row| Some(((definition.x)(row)?, row)))
-        .collect();
-    let mut variants = distinct(rows.iter().map(|(_, row)| &row.actor.variant));
-    variants.retain(|variant| variant != "oracle");
-    variants.sort_by_cached_key(|variant| order::variant(variant));
+fn figure(definition: &Definition, rows: &[&Aggregate]) -> Figure {
+    let placed = |row: &&'_ Aggregate| (definition.x)(row).is_some();
+    let rows: Vec<&Aggregate> = rows.iter().copied().filter(placed).collect();
+    let models = rows.chunk_by(|a, b| a.actor.variant == b.actor.variant);
     Figure {
+        experiment: rows.first().map(|row| row.actor.experiment.clone()).unwrap_or_default(),
         id: definition.id.to_owned(),
         title: definition.title.to_owned(),
         x_label: definition.x_label.to_owned(),
-        series: variants.into_iter().map(|variant| series(definition, &rows, variant)).collect(),
+        series: models.map(|rows| series(definition, rows)).collect(),
         source: definition.source.to_owned(),
     }
 }
 
-fn series(definition: &Definition, rows: &[(i64, &Aggregate)], variant: String) -> Series {
-    let own: Vec<&(i64, &Aggregate)> = rows.iter().filter(|(_, row)| row.actor.variant == variant).collect();
-    let mut positions: Vec<i64> = own.iter().map(|(x, _)| *x).collect();
-    positions.sort_unstable();
-    positions.dedup();
-    let point = |&x: &i64| {
-        let rows = own.iter().filter(|(own_x, _)| *own_x == x).map(|(_, row)| *row);
-        let row = rows.min_by_key(|row| order::actor(&row.actor))?;
-        Some(Point {
-            x,
-            success_rate: row.mean_success_rate,
-            wilson_low: row.wilson_low,
-            wilson_high: row.wilson_high,
-            seeds: row.seeds,
-            episodes: row.episodes,
-        })
+/// The points of one variant: at each quantity the first row.
+fn series(definition: &Definition, rows: &[&Aggregate]) -> Series {
+    let most_tasks = rows.iter().map(|row| row.actor.train_tasks).max();
+    let is_in = |row: &&&Aggregate| definition.is_over_tasks || Some(row.actor.train_tasks) == most_tasks;
+    let placed = rows.iter().filter(is_in).filter_map(|row| Some(((definition.x)(row)?, *row)));
+    let mut placed: Vec<(i64, &Aggregate)> = placed.collect();
+    placed.sort_by_key(|(x, _)| *x);
+    placed.dedup_by_key(|(x, _)| *x);
+    let point = |(x, row): &(i64, &Aggregate)| Point {
+        x: *x,
+        success_rate: row.mean_success_rate,
+        wilson_low: row.wilson_low,
+        wilson_high: row.wilson_high,
+        seeds: row.seeds,
+        episodes: row.episodes,
     };
-    let base = variant.strip_suffix("_paper").unwrap_or(&variant);
-    let paper = definition.paper.iter().filter(|(paper_variant, ..)| *paper_variant == base);
+    let paper = |(x, row): &(i64, &Aggregate)| Some(PaperPoint { x: *x, success_rate: row.paper_success_rate? });
     Series {
-        ours: positions.iter().filter_map(point).collect(),
-        paper: paper.map(|&(_, x, success_rate)| PaperPoint { x, success_rate }).collect(),
-        variant,
+        variant: rows[0].actor.variant.clone(),
+        parts: rows[0].actor.parts.clone(),
+        ours: placed.iter().map(point).collect(),
+        paper: placed.iter().filter_map(paper).collect(),
     }
 }
 
-/// Table Clean-up by bowls and forks, one grid a variant.
+/// Table Clean-up by bowls and forks, one grid a variant of an experiment.
 pub(super) fn grids(aggregates: &[Aggregate]) -> Vec<Grid> {
-    let mut cells: Vec<(String, GridCell)> = Vec::new();
-    let mut leading: Vec<&Aggregate> =
-        aggregates.iter().filter(|row| row.actor.variant != "oracle" && row.actor.is_the_papers()).collect();
-    leading.sort_by_cached_key(|row| order::actor(&row.actor));
-    for row in leading {
-        let Some((bowls, forks)) = bowls_and_forks(&row.suite) else { continue };
-        let variant = &row.actor.variant;
-        let is_there =
-            |(other, cell): &(String, GridCell)| other == variant && (cell.bowls, cell.forks) == (bowls, forks);
-        if !cells.iter().any(is_there) {
-            let cell = GridCell { bowls, forks, success_rate: row.mean_success_rate, episodes: row.episodes };
-            cells.push((variant.clone(), cell));
-        }
-    }
-    let mut variants = distinct(cells.iter().map(|(variant, _)| variant));
-    variants.sort_by_cached_key(|variant| order::variant(variant));
-    let grid = |variant: String| {
-        let own = cells.iter().filter(|(other, _)| *other == variant).map(|(_, cell)| cell.clone());
-        let mut own: Vec<GridCell> = own.collect();
-        own.sort_by_key(|cell| (cell.bowls, cell.forks));
-        Grid { variant, cells: own }
+    let of_experiment = |rows: &Vec<&Aggregate>| {
+        let models = rows.chunk_by(|a, b| a.actor.variant == b.actor.variant);
+        models.filter_map(grid).collect::<Vec<_>>()
     };
-    variants.into_iter().map(grid).collect()
+    experiments(aggregates).iter().flat_map(of_experiment).collect()
 }
 
-fn bowls_and_forks(suite: &str) -> Option<(i64, i64)> {
-    let (bowls, forks) = suite.strip_prefix("cleanup_unseen_")?.split_once('_')?;
-    Some((bowls.parse().ok()?, forks.parse().ok()?))
+fn grid(rows: &[&Aggregate]) -> Option<Grid> {
+    let mut cells: Vec<GridCell> = rows.iter().filter_map(|row| cell(row)).collect();
+    cells.sort_by_key(|cell| (cell.bowls, cell.forks));
+    cells.dedup_by_key(|cell| (cell.bowls, cell.forks));
+    let Aggregate { actor, .. } = rows.first()?;
+    let (experiment, variant) = (actor.experiment.clone(), actor.variant.clone());
+    (!cells.is_empty()).then_some(Grid { experiment, variant, cells })
+}
+
+fn cell(row: &Aggregate) -> Option<GridCell> {
+    let (bowls, forks) = bowls_and_forks(row)?;
+    Some(GridCell { bowls, forks, success_rate: row.mean_success_rate, episodes: row.episodes })
+}
+
+/// Bowls and forks of a suite of unseen tasks that all have as many.
+pub(super) fn bowls_and_forks(row: &Aggregate) -> Option<(i64, i64)> {
+    let is_unseen = asks(row, TABLE_CLEANUP, Ask::Unseen);
+    row.facts.bowls.zip(row.facts.instances()).filter(|_| is_unseen)
 }

@@ -6,13 +6,13 @@ use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
 use crate::report::claims::{Claim, Note, Verdict};
 use crate::report::detections::DetectionError;
+use crate::report::section::models::{self, ModelRow};
 use crate::report::summary::{Aggregate, FirstError, Report};
-use crate::report::tables::{self, ModelRow};
 
 /// A column: its name, and whether numbers stand in it.
 type Column<'c> = (&'c str, bool);
 
-const COLUMNS: [Column<'static>; 11] = [
+const COLUMNS: [Column<'static>; 12] = [
     ("suite", false),
     ("model", false),
     ("tasks", true),
@@ -20,6 +20,7 @@ const COLUMNS: [Column<'static>; 11] = [
     ("seeds", true),
     ("rollouts", true),
     ("success", true),
+    ("goals met", true),
     ("95 % over rollouts", false),
     ("lowest, highest seed", false),
     ("95 % over seeds", false),
@@ -40,7 +41,7 @@ pub(super) fn render(report: &Report) -> String {
     put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
     put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
-    put(&MODEL_COLUMNS, tables::models(&report.models).iter().map(model).collect());
+    put(&MODEL_COLUMNS, models::models(&report.models).iter().map(model).collect());
     if !report.notes.is_empty() {
         text.push('\n');
         report.notes.iter().for_each(|said| text.push_str(&note(said)));
@@ -77,7 +78,7 @@ fn detection(error: &DetectionError) -> Vec<String> {
         format!("{:.2}", error.deviation_cm),
         format!("{:.2}, {:.2}", error.percentile_95_cm, error.percentile_99_cm),
         format!("{:.2} %", 100.0 * error.over_2_cm),
-        format!("{:.0}", error.paper_deviation_cm),
+        error.paper_deviation_cm.map_or_else(none, |deviation| format!("{deviation:.0}")),
     ]
 }
 
@@ -136,15 +137,15 @@ fn none() -> String {
     "-".to_owned()
 }
 
-const CLAIM_COLUMNS: [Column<'static>; 4] =
-    [("the paper's claim", false), ("encoder", false), ("here", false), ("figures", false)];
+const CLAIM_COLUMNS: [Column<'static>; 5] =
+    [("the paper's claim", false), ("experiment", false), ("encoder", false), ("here", false), ("figures", false)];
 
 fn claim(claim: &Claim) -> Vec<String> {
     let verdict = match claim.verdict {
         Verdict::Reproduced => claim.verdict.words().to_owned(),
         _ => format!("**{}**", claim.verdict.words()),
     };
-    vec![claim.claim.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
+    vec![claim.claim.clone(), claim.experiment.clone(), claim.encoder.clone(), verdict, claim.ours.clone()]
 }
 
 fn note(note: &Note) -> String {
@@ -196,6 +197,7 @@ fn row(row: &Aggregate) -> Vec<String> {
         row.seeds.to_string(),
         row.episodes.to_string(),
         format!("{:.3}", row.mean_success_rate),
+        row.goals_met.map_or_else(none, |share| format!("{share:.3}")),
         pair(row.wilson_low, row.wilson_high),
         if row.seeds > 1 { range } else { none() },
         of_seeds.map_or_else(none, |(low, high)| pair(low, high)),

@@ -61,7 +61,8 @@ pub(super) fn read(inputs: &[MetricsInput]) -> Result<Vec<Curve>, ReportError> {
     curves.sort_by_cached_key(|curve| {
         let model = &curve.model;
         (
-            order::variant(&model.variant),
+            model.experiment.clone(),
+            order::model(&model.variant, &model.parts, false),
             model.tag.clone(),
             model.train_tasks,
             model.specification.clone(),

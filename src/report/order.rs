@@ -1,47 +1,29 @@
-//! The order in which variants, suites and levels are told: always the same, whatever the order of files and rows.
+//! The order in which models, suites and levels are told: by what they are, then by name; always the same, whatever the
+//! order of files and rows.
 
 use std::cmp::Reverse;
 
 use crate::program::Program;
-use crate::report::summary::{Actor, Aggregate};
+use crate::report::facts::SuiteFacts;
+use crate::report::summary::{Actor, Aggregate, ModelParts};
 use crate::task::Family;
 use crate::trace::SpecificationForm;
-
-/// Variants from the paper's model to its ancestor; the oracle stands last.
-const VARIANTS: [&str; 10] = [
-    "ntp",
-    "ntp_gru",
-    "ntp_no_scope",
-    "flat",
-    "flat_gru",
-    "npi",
-    "ntp_vid_e2e",
-    "ntp_vid_e2e_general",
-    "ntp_vid_detector",
-    "oracle",
-];
 
 /// Decoders, the one that stands for its model where only one can be shown first.
 pub(super) const DECODERS: [&str; 3] = ["mss", "am", "argmax"];
 
-/// Of the rows of one variant, told in one way what to do, in a suite of an experiment the one that stands for it: the most training tasks, the
-/// first decoder. Rows stand sorted by [`suite`] and [`actor`], so it is the first.
+/// Of the rows of one model in a suite the one that stands for it: the most training tasks, the first decoder. Rows
+/// stand sorted by [`suite`] and [`actor`], so it is the first.
 pub(super) fn leading(aggregates: &[Aggregate]) -> Vec<Aggregate> {
     let mut leading: Vec<Aggregate> = Vec::new();
     for row in aggregates {
-        let is_same = |other: &Aggregate| {
-            let (own, other_actor) = (&row.actor, &other.actor);
-            other.suite == row.suite && (&own.experiment, own.model()) == (&other_actor.experiment, other_actor.model())
-        };
+        let is_same = |other: &Aggregate| other.suite == row.suite && other.actor.is_same_model(&row.actor);
         if !leading.iter().any(is_same) {
             leading.push(row.clone());
         }
     }
     leading
 }
-
-/// What a suite asks of a family.
-const PARTS: [&str; 4] = ["unseen", "seen", "topology", "adversary"];
 
 /// A word of a name: letters or a number.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,39 +32,37 @@ pub(super) enum Word {
     Letters(String),
 }
 
-/// Sorts `sorting_4` before `sorting_40` and both after `sorting`.
+/// Sorts `sorting_4` before `sorting_40` and both after `sorting`. It is for people who look for a name: nothing is
+/// taken from it.
 fn natural(name: &str) -> Vec<Word> {
     let words = name.split('_').map(|word| word.parse().map_or_else(|_| Word::Letters(word.to_owned()), Word::Number));
     words.collect()
 }
 
-/// The place of a variant's kind, whichever its encoder.
-pub(super) fn variant_rank(name: &str) -> usize {
-    let base = name.strip_suffix("_paper").unwrap_or(name);
-    VARIANTS.iter().position(|&known| known == base).unwrap_or(VARIANTS.len())
+/// Models by their kind, each before its form with the paper's encoder; unknown ones behind.
+pub(super) fn model(name: &str, parts: &ModelParts, is_oracle: bool) -> impl Ord + use<> {
+    (parts.rank(is_oracle), parts.has_papers_encoder(), natural(name))
 }
 
-/// Known variants first, each before its form with the paper's encoder; others behind.
-pub(super) fn variant(name: &str) -> (usize, Vec<Word>) {
-    (variant_rank(name), natural(name))
-}
-
-/// By variant, the untagged first, then by how much it was trained on, the most first, then by decoder; experiments stand together.
+/// By model, the untagged first, then by how much it was trained on, the most first, then by decoder; experiments stand
+/// together.
 pub(super) fn actor(actor: &Actor) -> impl Ord + use<> {
-    let Actor { experiment, variant: name, tag, train_tasks, specification, decoder } = actor.clone();
+    let model = model(&actor.variant, &actor.parts, actor.is_oracle());
+    let Actor { experiment, variant: _, parts: _, tag, train_tasks, specification, decoder } = actor.clone();
     let decoder_rank = decoder.as_ref().and_then(|name| DECODERS.iter().position(|&known| known == name));
     // What the paper's models are told by comes first.
     let form = SpecificationForm::ALL.iter().position(|form| Some(form.name()) == specification.as_deref());
-    (experiment, variant(&name), form, tag, Reverse(train_tasks), specification, decoder_rank, decoder)
+    (experiment, model, form, tag, Reverse(train_tasks), specification, decoder_rank, decoder)
 }
 
-/// Families in their order; within one the held-out tasks first, since they are what counts.
-pub(super) fn suite(name: &str) -> (usize, usize, Vec<Word>) {
-    let (family, part) = name.split_once('_').unwrap_or((name, ""));
-    let family = Family::ALL.iter().position(|known| known.short_name() == family).unwrap_or(Family::ALL.len());
-    let part = part.split('_').next().unwrap_or_default();
-    let part = PARTS.iter().position(|&known| known == part).unwrap_or(PARTS.len());
-    (family, part, natural(name))
+/// Families in their order; within one the held-out tasks first, since they are what counts, then what is asked for
+/// otherwise, from little to much; unknown suites behind, by name.
+pub(super) fn suite(name: &str, facts: &SuiteFacts) -> impl Ord + use<> {
+    let known = Family::ALL.iter().position(|known| Some(known.name()) == facts.family.as_deref());
+    let family = known.unwrap_or(Family::ALL.len());
+    let push = (facts.push_percent(), facts.push_mns());
+    let instances = (!facts.shows_what_is_there(), facts.bowls, facts.on_table_min, facts.on_table_max);
+    (family, facts.ask().map_or((true, None), |ask| (false, Some(ask))), push, instances, natural(name))
 }
 
 /// Programs from the root down; other names behind.

@@ -14,9 +14,10 @@ use std::path::PathBuf;
 use polars::prelude::{DataType, Expr, LazyFrame, NULL, SortMultipleOptions, UnionArgs, col, concat, len, lit, when};
 
 use crate::report::chart::histogram::KINDS;
-use crate::report::frames::{Rows, collect, scan};
+use crate::report::facts::{self, SuiteFacts};
+use crate::report::frames::{Rows, collect, scan, scan_with};
 use crate::report::interval::wilson;
-use crate::report::summary::{Actor, Divergence, FirstError, SuiteResult};
+use crate::report::summary::{Actor, Divergence, FirstError, ModelParts, SuiteResult};
 use crate::report::{ReportError, order};
 
 const COLUMNS: [(&str, DataType); 17] = [
@@ -39,13 +40,24 @@ const COLUMNS: [(&str, DataType); 17] = [
     ("toppled", DataType::Int64),
 ];
 
+/// Columns that files of earlier versions lack, beside those of [`facts::COLUMNS`].
+const LATER: [(&str, DataType); 5] = [
+    ("goals", DataType::Int64),
+    ("goals_met", DataType::Int64),
+    ("core", DataType::String),
+    ("scoping", DataType::String),
+    ("encoder", DataType::String),
+];
+
 /// What a file does not say of itself: to which experiment it belongs.
 const EXPERIMENT: &str = "experiment";
 /// Nor what tells its model apart from others of its variant.
 const TAG: &str = "tag";
 /// What tells actors apart; see [`Actor`].
-const ACTOR: [&str; 6] = [EXPERIMENT, "variant", TAG, "train_tasks", "specification", "decoder"];
+const ACTOR: [&str; 9] =
+    [EXPERIMENT, "variant", "core", "scoping", "encoder", TAG, "train_tasks", "specification", "decoder"];
 const MICROS_PER_SEC: f64 = 1e6;
+const MILLIONTHS: i64 = 1_000_000;
 
 /// The rollouts of one model in one suite.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,10 +86,11 @@ pub(super) fn read(inputs: &[RolloutsInput]) -> Result<Rollouts, ReportError> {
     for input in inputs {
         check_rows(&input.path)?;
     }
+    let later: Vec<_> = LATER.into_iter().chain(facts::COLUMNS).collect();
     let frames = inputs.iter().map(|input| {
         let experiment = lit(input.experiment.clone()).alias(EXPERIMENT);
         let tag = input.tag.clone().map_or_else(|| lit(NULL).cast(DataType::String), lit).alias(TAG);
-        Ok(scan(&input.path, &COLUMNS)?.with_columns([experiment, tag]))
+        Ok(scan_with(&input.path, &COLUMNS, &later)?.with_columns([experiment, tag]))
     });
     let frames = frames.collect::<Result<Vec<_>, ReportError>>()?;
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
@@ -118,25 +131,27 @@ fn key(more: &[&str]) -> Vec<Expr> {
 
 /// The actor of each row of a table that was grouped by [`key`].
 fn actors(rows: &Rows<'_>) -> Result<Vec<Actor>, ReportError> {
-    let (experiments, variants, tags) = (rows.text(EXPERIMENT)?, rows.text("variant")?, rows.optional_text(TAG)?);
+    let (mut experiments, mut variants) = (rows.text(EXPERIMENT)?, rows.text("variant")?);
+    let text = |name: &str| rows.optional_text(name);
+    let (mut tags, mut specifications, mut decoders) = (text(TAG)?, text("specification")?, text("decoder")?);
+    let (mut cores, mut scopings, mut encoders) = (text("core")?, text("scoping")?, text("encoder")?);
     let train_tasks = rows.optional_whole("train_tasks")?;
-    let (specifications, decoders) = (rows.optional_text("specification")?, rows.optional_text("decoder")?);
-    let names = experiments.into_iter().zip(variants).zip(tags);
-    let settings = train_tasks.into_iter().zip(specifications).zip(decoders);
-    let actor = |(((experiment, variant), tag), ((train_tasks, specification), decoder))| Actor {
-        experiment,
-        variant,
-        tag,
-        train_tasks,
-        specification,
-        decoder,
+    let actor = |row: usize| Actor {
+        experiment: std::mem::take(&mut experiments[row]),
+        variant: std::mem::take(&mut variants[row]),
+        parts: ModelParts { core: cores[row].take(), scoping: scopings[row].take(), encoder: encoders[row].take() },
+        tag: tags[row].take(),
+        train_tasks: train_tasks[row],
+        specification: specifications[row].take(),
+        decoder: decoders[row].take(),
     };
-    Ok(names.zip(settings).map(actor).collect())
+    Ok((0..train_tasks.len()).map(actor).collect())
 }
 
 fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, ReportError> {
     let micros = (col("sim_secs") * lit(MICROS_PER_SEC)).cast(DataType::Int64).sum();
-    let sums = [
+    let met = (col("goals_met") * lit(MILLIONTHS)).floor_div(col("goals"));
+    let mut sums = vec![
         len().alias("episodes"),
         col("episode").n_unique().alias("distinct"),
         col("success").cast(DataType::Int64).sum().alias("successes"),
@@ -145,7 +160,12 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         col("pushes").count().alias("disturbed"),
         col("pushes").sum(),
         col("toppled").sum(),
+        col("goals_met").count().alias("judged"),
+        met.sum().alias("met"),
     ];
+    for (name, _) in facts::COLUMNS {
+        sums.extend([col(name).min(), col(name).max().alias(facts::highest(name))]);
+    }
     let by = key(&["suite", "training_seed"]);
     let grouped = all.clone().group_by(by.clone()).agg(sums);
     let table = collect(grouped.sort_by_exprs(by, SortMultipleOptions::default()), paths)?;
@@ -154,9 +174,11 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
     let (episodes, distinct) = (rows.whole("episodes")?, rows.whole("distinct")?);
     let (successes, calls, micros) = (rows.whole("successes")?, rows.whole("calls")?, rows.whole("sim_micros")?);
     let (disturbed, pushes, toppled) = (rows.whole("disturbed")?, rows.whole("pushes")?, rows.whole("toppled")?);
+    let (judged, met) = (rows.whole("judged")?, rows.whole("met")?);
+    let facts = SuiteFacts::read(&rows)?;
     let mut causes = causes(all, paths)?;
     let mut results = Vec::with_capacity(table.height());
-    for (row, actor) in actors(&rows)?.into_iter().enumerate() {
+    for (row, (actor, facts)) in actors(&rows)?.into_iter().zip(facts).enumerate() {
         let (suite, seed) = (suites[row].clone(), seeds[row]);
         if distinct[row] != episodes[row] {
             let rows = episodes[row] - distinct[row];
@@ -168,19 +190,23 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
             causes: causes.remove(&(actor.clone(), suite.clone(), seed)).unwrap_or_default(),
             actor,
             suite,
+            facts,
             seed,
             episodes: episodes[row] as u64,
             successes: successes[row] as u64,
             success_rate: successes[row] as f64 / n,
             wilson_low,
             wilson_high,
+            goals_met: (judged[row] > 0).then(|| met[row] as f64 / MILLIONTHS as f64 / judged[row] as f64),
             mean_calls: calls[row] as f64 / n,
             mean_sim_secs: micros[row] as f64 / MICROS_PER_SEC / n,
             pushes: (disturbed[row] > 0).then_some(pushes[row] as u64),
             toppled: (disturbed[row] > 0).then_some(toppled[row] as u64),
         });
     }
-    results.sort_by_cached_key(|result| (order::suite(&result.suite), order::actor(&result.actor), result.seed));
+    results.sort_by_cached_key(|result| {
+        (order::suite(&result.suite, &result.facts), order::actor(&result.actor), result.seed)
+    });
     Ok(results)
 }
 
@@ -228,14 +254,16 @@ fn errors(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<FirstError>, ReportE
 
 fn divergences(all: LazyFrame, paths: &[PathBuf]) -> Result<Vec<Divergence>, ReportError> {
     let ended = when(col("success")).then(lit("success")).otherwise(lit("failure")).alias("ended");
-    let by = ["variant", "suite", "ended", "first_divergence", "divergence_kind", "divergence_program"].map(col);
-    let query = all.filter(col("first_divergence").is_not_null()).with_column(ended).group_by(by);
+    let by = [EXPERIMENT, "variant", "suite", "ended", "first_divergence", "divergence_kind", "divergence_program"];
+    let query = all.filter(col("first_divergence").is_not_null()).with_column(ended).group_by(by.map(col));
     let table = collect(query.agg([len().alias("episodes")]), paths)?;
     let rows = Rows(&table);
-    let (variants, suites, ended) = (rows.text("variant")?, rows.text("suite")?, rows.text("ended")?);
+    let (experiments, variants) = (rows.text(EXPERIMENT)?, rows.text("variant")?);
+    let (suites, ended) = (rows.text("suite")?, rows.text("ended")?);
     let (kinds, programs) = (rows.text("divergence_kind")?, rows.text("divergence_program")?);
     let (decisions, episodes) = (rows.whole("first_divergence")?, rows.whole("episodes")?);
     let divergence = |row: usize| Divergence {
+        experiment: experiments[row].clone(),
         variant: variants[row].clone(),
         suite: suites[row].clone(),
         ended: ended[row].clone(),

@@ -12,16 +12,19 @@ use serde::Serialize;
 use crate::report::PaperValue;
 use crate::report::claims::{Claim, Note};
 use crate::report::detections::DetectionError;
+use crate::report::facts::SuiteFacts;
 use crate::report::figures::{Figure, Grid};
+use crate::report::filmstrip::Filmstrip;
+use crate::report::order::DECODERS;
 use crate::trace::SpecificationForm;
 
 /// Version of the file.
-pub(super) const SCHEMA_VERSION: u32 = 1;
+pub(super) const SCHEMA_VERSION: u32 = 2;
 
 /// Everything the report says in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Report {
-    /// Version of this form: 1.
+    /// Version of this form: 2.
     pub schema_version: u32,
     /// Version of the program that wrote it.
     pub ntp_version: String,
@@ -43,6 +46,8 @@ pub struct Report {
     pub divergences: Vec<Divergence>,
     /// What failed rollouts did wrong first.
     pub errors: Vec<FirstError>,
+    /// Episodes in pictures, which are on the page alone.
+    pub filmstrips: Vec<Filmstrip>,
     /// Errors of detectors in the demonstrations that models behind them were given.
     pub detections: Vec<DetectionError>,
     /// The end of each training curve; the whole curves are in curves.csv.
@@ -77,6 +82,23 @@ impl Actor {
     pub(super) fn is_demonstrated(&self) -> bool {
         self.specification.as_deref() != Some(SpecificationForm::Instructions.name())
     }
+
+    /// The model in a few words, and what else tells it apart.
+    pub(super) fn words(&self) -> String {
+        let tasks = self.train_tasks.map(|tasks| format!(" {tasks}"));
+        let decoder = self.decoder.as_deref().filter(|decoder| *decoder != DECODERS[0]).map(|name| format!(" {name}"));
+        format!("{}{}{}", self.model(), tasks.unwrap_or_default(), decoder.unwrap_or_default())
+    }
+
+    /// Whether it repeats the expert and was not trained.
+    pub(super) fn is_oracle(&self) -> bool {
+        self.train_tasks.is_none()
+    }
+
+    /// Which other rows differ in their training tasks and decoder alone.
+    pub(super) fn is_same_model(&self, other: &Self) -> bool {
+        (&self.experiment, self.model()) == (&other.experiment, other.model())
+    }
 }
 
 /// A variant's name, the form of its task specification where it is not the paper's, and its tag.
@@ -88,13 +110,27 @@ pub(super) fn model_name(variant: &str, specification: &str, tag: Option<&str>) 
     }
 }
 
+/// The parts of a network. Null for an oracle, and where they were not written down.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct ModelParts {
+    /// How it remembers the steps of a program call: `reactive` (not at all), `gru` or `lstm`.
+    pub core: Option<String>,
+    /// What it decides of the task specification: `scoped`, `unscoped`, `primitives` or `arguments`.
+    pub scoping: Option<String>,
+    /// How it reads observations.
+    pub encoder: Option<String>,
+}
+
 /// Who acts: what tells models apart but for the seed of their training.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 pub struct Actor {
     /// Of which experiment: a pipeline file's name.
     pub experiment: String,
-    /// The model's variant.
+    /// The model's variant: its name.
     pub variant: String,
+    /// Its parts.
+    #[serde(flatten)]
+    pub parts: ModelParts,
     /// What tells it apart from other models of its variant; null for most.
     pub tag: Option<String>,
     /// How many tasks it was trained on; null for an oracle.
@@ -113,6 +149,8 @@ pub struct SuiteResult {
     pub actor: Actor,
     /// The set of evaluation tasks.
     pub suite: String,
+    /// What it asks for.
+    pub facts: SuiteFacts,
     /// The seed of its training.
     pub seed: i64,
     /// How many rollouts.
@@ -125,13 +163,16 @@ pub struct SuiteResult {
     pub wilson_low: f64,
     /// Upper end of its interval.
     pub wilson_high: f64,
+    /// Share of a task's goals that hold in the end, on average: the paper's "proportion of task completed"; null where
+    /// it was not measured.
+    pub goals_met: Option<f64>,
     /// Failures by cause.
     pub causes: BTreeMap<String, u64>,
     /// Program calls a rollout, on average.
     pub mean_calls: f64,
     /// Simulated seconds a rollout, on average.
     pub mean_sim_secs: f64,
-    /// An adversary's pushes in all rollouts; `None` in a suite without one.
+    /// An adversary's pushes in all rollouts; null in a suite without one.
     pub pushes: Option<u64>,
     /// The bodies that they toppled.
     pub toppled: Option<u64>,
@@ -145,6 +186,8 @@ pub struct Aggregate {
     pub actor: Actor,
     /// The set of evaluation tasks.
     pub suite: String,
+    /// What it asks for.
+    pub facts: SuiteFacts,
     /// How many training seeds.
     pub seeds: u64,
     /// Rollouts of all seeds.
@@ -166,19 +209,30 @@ pub struct Aggregate {
     pub wilson_low: f64,
     /// Upper end of the interval of all seeds' rollouts taken together.
     pub wilson_high: f64,
+    /// Share of a task's goals that hold in the end, the mean over seeds; null where it was not measured.
+    pub goals_met: Option<f64>,
     /// Failures by cause.
     pub causes: BTreeMap<String, u64>,
     /// An adversary's pushes in all rollouts; null in a suite without one.
     pub pushes: Option<u64>,
     /// The bodies that they toppled.
     pub toppled: Option<u64>,
-    /// The paper's share of successes, where it gives one.
+    /// The paper's share of successes, where it gives one under these conditions.
     pub paper_success_rate: Option<f64>,
+}
+
+impl Aggregate {
+    /// Whether another row is of the same suite: of its name, in tasks of the same kind.
+    pub(super) fn is_same_suite(&self, other: &Self) -> bool {
+        (&self.suite, &self.facts) == (&other.suite, &other.facts)
+    }
 }
 
 /// Rollouts of a variant in a suite whose first departure from the expert is of one kind, at one decision.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 pub struct Divergence {
+    /// Of which experiment.
+    pub experiment: String,
     /// The model's variant.
     pub variant: String,
     /// The set of evaluation tasks.
@@ -216,8 +270,11 @@ pub struct FirstError {
 pub struct ModelSummary {
     /// Of which experiment.
     pub experiment: String,
-    /// Its variant.
+    /// Its variant: its name.
     pub variant: String,
+    /// Its parts.
+    #[serde(flatten)]
+    pub parts: ModelParts,
     /// What tells it apart from other models of its variant; null for most.
     pub tag: Option<String>,
     /// How many tasks it was trained on.

@@ -124,6 +124,109 @@ fn imported_tasks_run_through_every_stage_and_suite() {
     }
 }
 
+/// Rows of a statement over a run.
+#[track_caller]
+fn ask(run: &Path, sql: &str) -> Vec<Value> {
+    let (code, rows, stderr) = ntp(&["query", &run.to_string_lossy(), sql, "--json"]);
+    assert_eq!(code, 0, "{stderr}");
+    serde_json::from_str(&rows).unwrap()
+}
+
+#[test]
+fn rows_say_what_their_suite_and_model_are_and_how_far_they_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), PIPELINE, 8);
+    let out = folder.path().join("run");
+    assert_eq!(ntp(&["run", &path, "--out", &out.to_string_lossy(), "--to", "rollout"]).0, 0);
+    let sql = "SELECT DISTINCT suite, family, blocks, \"order\", adversary_probability AS p, adversary_impulse_ns AS impulse, \
+               on_table_min, bowls, objects, goals FROM rollouts ORDER BY suite";
+    let row = |suite: &str, order: &str, push: [f64; 2]| {
+        json!({"suite": suite, "family": "block_stacking", "blocks": 8, "order": order, "p": push[0],
+               "impulse": push[1], "on_table_min": null, "bowls": null, "objects": 8, "goals": 3})
+    };
+    let expected = [
+        row("stacking_adversary", "own", [0.5, 0.06]),
+        row("stacking_topology", "shuffled", [0.0, 0.0]),
+        row("stacking_unseen", "own", [0.0, 0.0]),
+    ];
+    assert_eq!(ask(&out, sql), expected);
+    let parts = ask(&out, "SELECT DISTINCT variant, core, scoping, encoder FROM rollouts ORDER BY variant");
+    let of = |variant: &str, parts: [Value; 3]| {
+        let [core, scoping, encoder] = parts;
+        json!({"variant": variant, "core": core, "scoping": scoping, "encoder": encoder})
+    };
+    let ntp_parts = ["reactive", "scoped", "object_centric"].map(Value::from);
+    assert_eq!(parts, [of("ntp", ntp_parts), of("oracle", [Value::Null, Value::Null, Value::Null])]);
+    // Whoever succeeds meets all goals, and who ended by itself and does not, does not.
+    let sql = "SELECT COUNT(*) AS n FROM rollouts WHERE success AND goals_met < goals \
+               OR outcome = 'ended_early' AND goals_met = goals";
+    assert_eq!(ask(&out, sql), [json!({"n": 0})]);
+    let met =
+        ask(&out, "SELECT SUM(goals_met) AS met FROM rollouts WHERE variant = 'oracle' AND adversary_probability = 0");
+    assert_eq!(met, [json!({"met": 24})], "the oracle meets all three goals of eight undisturbed rollouts");
+}
+
+#[test]
+fn suites_by_other_names_are_told_in_the_same_report() {
+    let names =
+        [("stacking_unseen", "zeta"), ("stacking_topology", "stacking_unseen_2"), ("stacking_adversary", "alpha")];
+    let renamed = names.iter().fold(PIPELINE.to_owned(), |text, (from, to)| text.replace(from, to));
+    let told = |pipeline: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = write(folder.path(), pipeline, 8);
+        let out = folder.path().join("run");
+        assert_eq!(ntp(&["run", &path, "--out", &out.to_string_lossy()]).0, 0);
+        let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+        let aggregates = report["aggregates"].as_array().unwrap().iter();
+        let facts: Vec<Value> = aggregates.map(|row| json!([row["variant"], row["facts"]])).collect();
+        let figures: Vec<Value> =
+            report["figures"].as_array().unwrap().iter().map(|figure| json!([figure["id"], figure["title"]])).collect();
+        (facts, figures)
+    };
+    // Trials are drawn by the suite's name, so that shares may differ; what is told of them does not.
+    let (facts, figures) = told(PIPELINE);
+    assert_eq!(facts.len(), 6);
+    assert_eq!((facts, figures), told(&renamed));
+}
+
+#[test]
+fn the_report_shows_episodes_and_how_to_replay_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), PIPELINE, 8);
+    let out = folder.path().join("run");
+    assert_eq!(ntp(&["run", &path, "--out", &out.to_string_lossy()]).0, 0);
+    let page = std::fs::read(out.join("report/index.html")).unwrap();
+    let report: Value = serde_json::from_slice(&std::fs::read(out.join("report/report.json")).unwrap()).unwrap();
+    let strips = report["filmstrips"].as_array().unwrap();
+    let failures: Vec<&Value> = strips.iter().filter(|strip| strip["shows"] == "failure").collect();
+    assert!(!failures.is_empty(), "four steps teach nothing: {strips:?}");
+    for strip in &failures {
+        let suite = failures.iter().filter(|other| other["suite"] == strip["suite"]).count();
+        assert!(suite <= 3, "the first failures of a suite are few");
+        let pictures = strip["pictures"].as_array().unwrap();
+        assert!((2..=6).contains(&pictures.len()) && pictures[0]["call"] == "start", "{strip:#}");
+        let departures = pictures.iter().filter(|picture| picture["is_departure"] == true).count();
+        assert_eq!(departures, usize::from(!strip["left"].is_null()), "{strip:#}");
+        let command: Vec<&str> = strip["replay"].as_str().unwrap().split(' ').collect();
+        let ["ntp", "replay", place, "--episode", number, "--spawn"] = command[..] else { panic!("{command:?}") };
+        let rrd = folder.path().join("strip.rrd").to_string_lossy().into_owned();
+        let place = out.join(place).to_string_lossy().into_owned();
+        let (code, replayed, stderr) = ntp(&["replay", &place, "--episode", number, "--save", &rrd, "--json"]);
+        assert_eq!(code, 0, "{stderr}");
+        let replayed: Value = serde_json::from_str(&replayed).unwrap();
+        let leaves = &replayed["episodes"][0]["first_divergence"]["secs"];
+        match strip["left"].as_str() {
+            Some(left) => assert!(left.contains(&format!("at {:.1} s", leaves.as_f64().unwrap())), "{left}: {leaves}"),
+            None => assert!(leaves.is_null()),
+        }
+    }
+    let n_pictures: usize = strips.iter().map(|strip| strip["pictures"].as_array().unwrap().len()).sum();
+    let page_text = String::from_utf8(page.clone()).unwrap();
+    assert_eq!(page_text.matches("src=\"data:image/jpeg;base64,").count(), n_pictures);
+    assert_eq!(ntp(&["report", &path, "--out", &out.to_string_lossy(), "--force"]).0, 0);
+    assert_eq!(std::fs::read(out.join("report/index.html")).unwrap(), page, "the same run has the same page");
+}
+
 #[track_caller]
 fn check_refused(pipeline: &str, n_tasks: usize, code: i32, expected: &[&str]) {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Key, N_COLORS, Tick};
-use crate::report::page::{name_of, title_of};
 use crate::report::summary::Aggregate;
 use crate::trace::Cause;
 
@@ -33,6 +32,8 @@ pub(in crate::report) struct BarRow {
     pub(in crate::report) name: String,
     /// Failed rollouts in percent of all.
     pub(in crate::report) failed: String,
+    /// Share of a task's goals that hold in the end, on average, in percent.
+    pub(in crate::report) goals_met: Option<String>,
     pub(in crate::report) parts: Vec<BarPart>,
 }
 
@@ -52,11 +53,12 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
     let end = ENDS.into_iter().find(|&end| end >= highest).unwrap_or(1.0);
     let causes = causes(aggregates);
     let row = |row: &Aggregate| BarRow {
-        name: name_of(&row.actor),
+        name: row.actor.words(),
         failed: percent(share(row)),
+        goals_met: row.goals_met.map(percent),
         parts: parts(row, &causes, end),
     };
-    let suite = |rows: &[Aggregate]| BarSuite { title: title_of(&rows[0].suite), rows: rows.iter().map(row).collect() };
+    let suite = |rows: &[Aggregate]| BarSuite { title: rows[0].suite.clone(), rows: rows.iter().map(row).collect() };
     let tick = |mark: usize| {
         let value = end * mark as f64 / N_STEPS as f64;
         Tick { at: place(value, 0.0, end), label: short(100.0 * value) }
@@ -67,7 +69,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
             .iter()
             .map(|cause| Key { label: cause.replace('_', " "), color: color(cause), hollow: false })
             .collect(),
-        suites: aggregates.chunk_by(|a, b| a.suite == b.suite).map(suite).collect(),
+        suites: aggregates.chunk_by(Aggregate::is_same_suite).map(suite).collect(),
     })
 }
 

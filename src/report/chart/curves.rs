@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{coordinate, nice_step, power_of_ten, thousands};
-use crate::report::chart::{PANEL, Tick, color_of, distinct, has_paper_encoder};
+use crate::report::chart::{PANEL, Tick, distinct};
 use crate::report::metrics::{Curve, CurvePoint, PARTS};
 use crate::report::summary::model_name;
 
@@ -91,7 +91,7 @@ fn panel(curves: &[&Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel
             model.train_tasks,
             model.seed
         );
-        Some(Line { color: color_of(&model.variant), dashed: has_paper_encoder(&model.variant), path, tip })
+        Some(Line { color: model.parts.color(false), dashed: model.parts.has_papers_encoder(), path, tip })
     };
     let step = nice_step(axes.last_step, 4.0);
     let x_tick = |mark: usize| {

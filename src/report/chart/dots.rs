@@ -4,8 +4,7 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
-use crate::report::chart::{Tick, color_of, has_paper_encoder};
-use crate::report::page::{name_of, title_of};
+use crate::report::chart::{Tick, color_of};
 use crate::report::summary::{Aggregate, SuiteResult};
 
 /// Where the axis may begin, and the distance of its marks then.
@@ -26,6 +25,8 @@ pub(in crate::report) struct DotPlot {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct DotSuite {
     pub(in crate::report) title: String,
+    /// What it asks for, in words.
+    pub(in crate::report) facts: String,
     pub(in crate::report) rows: Vec<DotRow>,
 }
 
@@ -61,9 +62,9 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
         let is_same = |seed: &&SuiteResult| seed.actor == row.actor && seed.suite == row.suite;
         let seeds = results.iter().filter(is_same).map(|seed| at(seed.success_rate));
         DotRow {
-            name: name_of(&row.actor),
-            color: color_of(&row.actor.variant),
-            hollow: has_paper_encoder(&row.actor.variant),
+            name: row.actor.words(),
+            color: color_of(&row.actor),
+            hollow: row.actor.parts.has_papers_encoder(),
             mean_at: at(row.mean_success_rate),
             low_at: at(row.wilson_low),
             high_at: at(row.wilson_high),
@@ -77,7 +78,11 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
             successes: row.successes,
         }
     };
-    let suite = |rows: &[Aggregate]| DotSuite { title: title_of(&rows[0].suite), rows: rows.iter().map(row).collect() };
+    let suite = |rows: &[Aggregate]| DotSuite {
+        title: rows[0].suite.clone(),
+        facts: rows[0].facts.words(),
+        rows: rows.iter().map(row).collect(),
+    };
     let n_steps = ((1.0 - start) / step).round() as usize;
     let tick = |mark: usize| {
         let value = start + mark as f64 * step;
@@ -85,7 +90,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
     };
     Some(DotPlot {
         ticks: (0..=n_steps).map(tick).collect(),
-        suites: aggregates.chunk_by(|a, b| a.suite == b.suite).map(suite).collect(),
+        suites: aggregates.chunk_by(Aggregate::is_same_suite).map(suite).collect(),
         cut_at: (start > 0.0).then(|| short(100.0 * start)),
         has_paper: aggregates.iter().any(|row| row.paper_success_rate.is_some()),
         has_seeds: aggregates.iter().any(|row| row.seeds > 1),

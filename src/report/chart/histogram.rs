@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{coordinate, nice_step, thousands};
 use crate::report::chart::{Key, PANEL, Tick, distinct};
 use crate::report::order;
-use crate::report::summary::{Aggregate, Divergence, FirstError};
+use crate::report::summary::{Actor, Aggregate, Divergence, FirstError};
 
 /// What can differ, and its colour.
 pub(in crate::report) const KINDS: [(&str, usize); 5] =
@@ -24,9 +24,11 @@ pub(in crate::report) struct Histograms {
     pub(in crate::report) panels: Vec<Histogram>,
 }
 
-/// One variant over all suites.
+/// One variant over all suites of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct Histogram {
+    /// Told where there are several.
+    pub(in crate::report) experiment: String,
     pub(in crate::report) title: String,
     /// How many rollouts failed.
     pub(in crate::report) failed: u64,
@@ -67,30 +69,43 @@ pub(in crate::report) struct Cell {
     pub(in crate::report) shade: u64,
 }
 
-/// Nothing when no failed rollout diverged.
+/// Nothing when no failed rollout diverged. Variants stand in the order of the rows.
 pub(in crate::report) fn plot(
     divergences: &[Divergence],
     errors: &[FirstError],
     aggregates: &[Aggregate],
 ) -> Option<Histograms> {
-    let mut variants = distinct(divergences.iter().map(|divergence| &divergence.variant));
-    variants.sort_by_cached_key(|variant| order::variant(variant));
-    let panel = |variant: &String| {
-        let histogram = panel(divergences, aggregates, variant)?;
-        Some(Histogram { programs: programs(errors, variant), ..histogram })
+    let mut rows: Vec<&Aggregate> = aggregates.iter().collect();
+    rows.sort_by_cached_key(|row| order::actor(&row.actor));
+    rows.dedup_by(|later, row| Model::of(&later.actor) == Model::of(&row.actor));
+    let panel = |row: &Aggregate| {
+        let model = Model::of(&row.actor);
+        let histogram = panel(divergences, aggregates, model)?;
+        Some(Histogram { programs: programs(errors, model), ..histogram })
     };
-    let panels: Vec<Histogram> = variants.iter().filter_map(panel).collect();
+    let panels: Vec<Histogram> = rows.into_iter().filter_map(panel).collect();
     let key = |(kind, color): (&str, usize)| Key { label: kind.replace('_', " "), color, hollow: false };
     (!panels.is_empty()).then(|| Histograms { keys: KINDS.into_iter().map(key).collect(), panels })
 }
 
-fn panel(divergences: &[Divergence], aggregates: &[Aggregate], variant: &str) -> Option<Histogram> {
-    let own = || divergences.iter().filter(|divergence| divergence.variant == variant);
+/// What a panel is of: an experiment and a variant.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Model<'a>(&'a str, &'a str);
+
+impl<'a> Model<'a> {
+    fn of(actor: &'a Actor) -> Self {
+        Self(&actor.experiment, &actor.variant)
+    }
+}
+
+fn panel(divergences: &[Divergence], aggregates: &[Aggregate], model: Model<'_>) -> Option<Histogram> {
+    let own = || divergences.iter().filter(|one| Model(&one.experiment, &one.variant) == model);
     let failures: Vec<&Divergence> = own().filter(|divergence| divergence.ended == "failure").collect();
     let bins = Bins::new(&failures)?;
-    let failed = aggregates.iter().filter(|row| row.actor.variant == variant).map(|row| row.episodes - row.successes);
+    let failed = aggregates.iter().filter(|row| Model::of(&row.actor) == model).map(|row| row.episodes - row.successes);
     Some(Histogram {
-        title: variant.to_owned(),
+        experiment: model.0.to_owned(),
+        title: model.1.to_owned(),
         failed: failed.sum(),
         diverged: failures.iter().map(|one| one.episodes).sum(),
         recovered: own().filter(|one| one.ended == "success").map(|one| one.episodes).sum(),
@@ -179,8 +194,8 @@ fn bin_name(bin: i64, per_bin: i64) -> String {
 }
 
 /// Failed rollouts by the program that was wrong first, and in what; physics in a row and a column of its own.
-fn programs(errors: &[FirstError], variant: &str) -> Vec<ProgramRow> {
-    let own: Vec<&FirstError> = errors.iter().filter(|error| error.actor.variant == variant).collect();
+fn programs(errors: &[FirstError], model: Model<'_>) -> Vec<ProgramRow> {
+    let own: Vec<&FirstError> = errors.iter().filter(|error| Model::of(&error.actor) == model).collect();
     let mut names = distinct(own.iter().filter_map(|error| error.program.as_ref()));
     names.sort_by_cached_key(|program| order::level(program));
     let mut rows: Vec<(Option<&String>, &str)> = names.iter().map(|name| (Some(name), name.as_str())).collect();

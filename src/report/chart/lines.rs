@@ -4,12 +4,14 @@
 use serde::Serialize;
 
 use crate::report::chart::scale::{coordinate, percent, short, thousands};
-use crate::report::chart::{PANEL, Tick, color_of, has_paper_encoder};
+use crate::report::chart::{PANEL, Tick};
 use crate::report::figures::{Figure, Series};
 
 /// One figure of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(in crate::report) struct LinePlot {
+    /// Told where there are several.
+    pub(in crate::report) experiment: String,
     pub(in crate::report) title: String,
     pub(in crate::report) source: String,
     pub(in crate::report) x_label: String,
@@ -96,6 +98,7 @@ pub(in crate::report) fn plot(figure: &Figure) -> LinePlot {
         }
     }
     LinePlot {
+        experiment: figure.experiment.clone(),
         title: figure.title.clone(),
         source: figure.source.clone(),
         x_label: figure.x_label.clone(),
@@ -126,22 +129,21 @@ fn line(series: &Series, places: &Places, shift: f64) -> PlotLine {
     let dots: Vec<PlotDot> = dots.collect();
     PlotLine {
         label: series.variant.clone(),
-        color: color_of(&series.variant),
-        dashed: has_paper_encoder(&series.variant),
+        color: series.parts.color(false),
+        dashed: series.parts.has_papers_encoder(),
         path: path(dots.iter().map(|dot| (&dot.x, &dot.y))),
         dots,
     }
 }
 
 fn paper_line(series: &Series, places: &Places) -> PaperLine {
-    let base = series.variant.strip_suffix("_paper").unwrap_or(&series.variant);
     let marks = series.paper.iter().map(|point| PaperMark {
         x: places.x(point.x, 0.0),
         y: coordinate(PANEL.y(point.success_rate)),
-        tip: format!("paper, {base} at {}: {} %", point.x, percent(point.success_rate)),
+        tip: format!("the paper at {}: {} %", point.x, percent(point.success_rate)),
     });
     let marks: Vec<PaperMark> = marks.collect();
-    PaperLine { color: color_of(base), path: path(marks.iter().map(|mark| (&mark.x, &mark.y))), marks }
+    PaperLine { color: series.parts.color(false), path: path(marks.iter().map(|mark| (&mark.x, &mark.y))), marks }
 }
 
 fn path<'a>(points: impl Iterator<Item = (&'a String, &'a String)>) -> String {

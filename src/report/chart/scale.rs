@@ -30,6 +30,17 @@ pub(in crate::report) fn thousands(number: u64) -> String {
     text
 }
 
+/// So many of something.
+pub(in crate::report) fn plural(count: u64, one: &str, many: &str) -> String {
+    format!("{} {}", thousands(count), if count == 1 { one } else { many })
+}
+
+/// A difference in percentage points, with a true minus sign.
+pub(in crate::report) fn points(difference: f64) -> String {
+    let sign = if difference < 0.0 { '\u{2212}' } else { '+' };
+    format!("{sign}{:.1}", 100.0 * difference.abs())
+}
+
 /// A number without trailing zeros.
 pub(in crate::report) fn short(number: f64) -> String {
     let text = format!("{number:.2}");

@@ -1,0 +1,190 @@
+//! What a suite asks for, as its rollouts say. Figures, claims and order go by this and never by a suite's name.
+
+use polars::prelude::DataType;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::report::ReportError;
+use crate::report::frames::Rows;
+use crate::task::Split;
+
+/// The families of the paper's experiments, as files name them.
+pub(super) const BLOCK_STACKING: &str = "block_stacking";
+pub(super) const OBJECT_SORTING: &str = "object_sorting";
+pub(super) const TABLE_CLEANUP: &str = "table_cleanup";
+
+/// The columns of [`SuiteFacts`].
+pub(super) const COLUMNS: [(&str, DataType); 12] = [
+    ("split", DataType::String),
+    ("family", DataType::String),
+    ("blocks", DataType::Int64),
+    ("order", DataType::String),
+    ("adversary_probability", DataType::Float64),
+    ("adversary_impulse_ns", DataType::Float64),
+    ("demonstrated_min", DataType::Int64),
+    ("demonstrated_max", DataType::Int64),
+    ("on_table_min", DataType::Int64),
+    ("on_table_max", DataType::Int64),
+    ("bowls", DataType::Int64),
+    ("objects", DataType::Int64),
+];
+
+/// What a suite asks for. A fact is null where the suite has no such thing, where its episodes differ in it, and where
+/// it was not written down: then `family` is null too.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct SuiteFacts {
+    /// `seen` or `unseen`: whether its tasks were trained on.
+    pub split: Option<String>,
+    /// The kind of tasks.
+    pub family: Option<String>,
+    /// Blocks within reach.
+    pub blocks: Option<i64>,
+    /// In which order the sub-tasks are demonstrated: `own` or `shuffled`.
+    pub order: Option<String>,
+    /// Chance of a push of an adversary after each placement; 0 without one.
+    pub adversary_probability: Option<f64>,
+    /// Impulse of a push in newton seconds; 0 without an adversary.
+    pub adversary_impulse_ns: Option<f64>,
+    /// The fewest instances of a category in the demonstration.
+    pub demonstrated_min: Option<i64>,
+    /// The most.
+    pub demonstrated_max: Option<i64>,
+    /// The fewest instances of a category on the table.
+    pub on_table_min: Option<i64>,
+    /// The most.
+    pub on_table_max: Option<i64>,
+    /// Bowls that each task asks for.
+    pub bowls: Option<i64>,
+    /// The fewest things on the table that may be moved.
+    pub objects_min: Option<i64>,
+    /// The most.
+    pub objects_max: Option<i64>,
+}
+
+/// What a suite of the paper asks for, whichever the family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Ask {
+    /// Tasks that were not trained on, as they are.
+    Unseen,
+    /// Tasks that were trained on, as they are.
+    Seen,
+    /// Towers in another order than their own.
+    Topology,
+    /// An adversary pushes.
+    Adversary,
+}
+
+impl SuiteFacts {
+    /// The facts of each row of a grouped table: the columns' lowest values, and their highest under [`highest`].
+    pub(super) fn read(rows: &Rows<'_>) -> Result<Vec<Self>, ReportError> {
+        let text =
+            |name: &str| Ok::<_, ReportError>(same(rows.optional_text(name)?, rows.optional_text(&highest(name))?));
+        let whole =
+            |name: &str| Ok::<_, ReportError>(same(rows.optional_whole(name)?, rows.optional_whole(&highest(name))?));
+        let real =
+            |name: &str| Ok::<_, ReportError>(same(rows.optional_real(name)?, rows.optional_real(&highest(name))?));
+        let (mut split, mut family, mut order) = (text("split")?, text("family")?, text("order")?);
+        let (probability, impulse) = (real("adversary_probability")?, real("adversary_impulse_ns")?);
+        let (demonstrated_min, demonstrated_max) = (whole("demonstrated_min")?, whole("demonstrated_max")?);
+        let (on_table_min, on_table_max) = (whole("on_table_min")?, whole("on_table_max")?);
+        let (blocks, bowls) = (whole("blocks")?, whole("bowls")?);
+        let (objects_min, objects_max) = (rows.optional_whole("objects")?, rows.optional_whole(&highest("objects"))?);
+        let facts = |row: usize| Self {
+            split: split[row].take(),
+            family: family[row].take(),
+            blocks: blocks[row],
+            order: order[row].take(),
+            adversary_probability: probability[row],
+            adversary_impulse_ns: impulse[row],
+            demonstrated_min: demonstrated_min[row],
+            demonstrated_max: demonstrated_max[row],
+            on_table_min: on_table_min[row],
+            on_table_max: on_table_max[row],
+            bowls: bowls[row],
+            objects_min: objects_min[row],
+            objects_max: objects_max[row],
+        };
+        Ok((0..blocks.len()).map(facts).collect())
+    }
+
+    /// Which part of the paper's experiments it is, as far as it is known.
+    pub(super) fn ask(&self) -> Option<Ask> {
+        let split = self.split.as_deref()?;
+        Some(match self.order.as_deref()? {
+            _ if self.adversary_probability? > 0.0 => Ask::Adversary,
+            "own" if split == Split::Unseen.name() => Ask::Unseen,
+            "own" => Ask::Seen,
+            _ => Ask::Topology,
+        })
+    }
+
+    /// Whether it asks so of a family.
+    pub(super) fn asks(&self, family: &str, ask: Ask) -> bool {
+        self.family.as_deref() == Some(family) && self.ask() == Some(ask)
+    }
+
+    /// Whether as many instances of each category are on the table as in the demonstration.
+    pub(super) fn shows_what_is_there(&self) -> bool {
+        (self.demonstrated_min, self.demonstrated_max) == (self.on_table_min, self.on_table_max)
+    }
+
+    /// Instances of each category, in the demonstration and on the table; `None` where they differ.
+    pub(super) fn instances(&self) -> Option<i64> {
+        self.on_table_min.filter(|_| self.shows_what_is_there() && self.on_table_min == self.on_table_max)
+    }
+
+    /// Things on the table that may be moved, where all episodes have as many.
+    pub(super) fn objects(&self) -> Option<i64> {
+        self.objects_min.filter(|_| self.objects_min == self.objects_max)
+    }
+
+    /// Chance of a push after each placement, in percent.
+    pub(super) fn push_percent(&self) -> Option<i64> {
+        self.adversary_probability.map(|share| (100.0 * share).round() as i64)
+    }
+
+    /// Impulse of a push in millinewton seconds.
+    pub(super) fn push_mns(&self) -> Option<i64> {
+        self.adversary_impulse_ns.map(|impulse| (1000.0 * impulse).round() as i64)
+    }
+
+    /// In a few words: `Block Stacking, 4 blocks, unseen tasks, a push at 25 %`. Empty where nothing is known.
+    pub(super) fn words(&self) -> String {
+        let Some(family) = &self.family else { return String::new() };
+        let mut words = vec![capitalized(family)];
+        words.extend(self.blocks.map(|blocks| format!("{blocks} blocks")));
+        words.extend(self.bowls.map(|bowls| plural(bowls, "bowl")));
+        words.extend(self.objects().filter(|_| self.blocks.is_none()).map(|objects| plural(objects, "object")));
+        words.extend(self.split.as_ref().map(|split| format!("{split} tasks")));
+        words.extend((self.order.as_deref() == Some("shuffled")).then(|| "towers in another order".to_owned()));
+        let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
+        words.extend(push.map(|(percent, mns)| format!("a push of {mns} mN\u{202f}s at {percent} %")));
+        if !self.shows_what_is_there() {
+            words.push("more on the table than was shown".to_owned());
+        }
+        words.join(", ")
+    }
+}
+
+/// Under which name a grouped table has the highest value of a column.
+pub(super) fn highest(name: &str) -> String {
+    format!("{name}_highest")
+}
+
+/// The value of each group whose lowest and highest are the same.
+fn same<T: PartialEq>(lowest: Vec<Option<T>>, highest: Vec<Option<T>>) -> Vec<Option<T>> {
+    lowest.into_iter().zip(highest).map(|(low, high)| low.filter(|low| Some(low) == high.as_ref())).collect()
+}
+
+/// `block_stacking` as `Block Stacking`.
+fn capitalized(name: &str) -> String {
+    let word = |word: &str| {
+        let mut letters = word.chars();
+        letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect::<String>()
+    };
+    name.split('_').map(word).collect::<Vec<_>>().join(" ")
+}
+
+fn plural(count: i64, word: &str) -> String {
+    format!("{count} {word}{}", if count == 1 { "" } else { "s" })
+}
