@@ -21,7 +21,6 @@ mod cursor;
 mod diff;
 mod error;
 mod fit;
-pub(super) mod numbers;
 mod pictures;
 mod pieces;
 mod renumber;
@@ -38,7 +37,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, IoError, Plan, Receipt, StageDir, StagedDir};
-use crate::dataset::layout;
+use crate::dataset::files::layout;
 
 pub use condition::{Condition, Ending};
 pub use diff::{ChangedEpisode, Difference, EpisodeName, diff};

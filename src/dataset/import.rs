@@ -29,9 +29,9 @@ use serde_json::{Value, json};
 use crate::artifact::{IoError, StagedDir, read_json, sha256_bytes, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
-use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
-use crate::dataset::layout;
-use crate::dataset::text_files::{write_subtasks, write_tasks};
+use crate::dataset::files::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::files::layout;
+use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 use frames::write_frames;
 use rows::{AnnotatedRows, write_meta};

@@ -1,6 +1,6 @@
 //! The contracts of a dataset's tables.
 
-use crate::dataset::feature::FEATURES;
+use crate::dataset::tables::frames::feature::FEATURES;
 use crate::table::{TableSchema, schema};
 
 /// Every table of a dataset.

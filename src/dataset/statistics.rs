@@ -6,6 +6,7 @@
 //! Deviation is that of the population, quantiles are interpolated linearly between the two nearest values. Episodes
 //! have no quantiles of their own: `LeRobot`'s readers do without, and of some twenty values they would say little.
 
+pub(crate) mod batches;
 mod number;
 mod quantile;
 mod spool;
@@ -16,7 +17,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::IoError;
-use crate::dataset::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
 use crate::table::Values;
 
 pub(in crate::dataset) use number::copy_values;

@@ -4,29 +4,27 @@
 //! missing) ends the check of that table; the others go on.
 
 mod annotated;
-mod episode;
-mod frames;
 mod meta;
 mod pictures;
-mod scopes;
 
 use std::path::Path;
 
 use crate::artifact::read_json;
-use crate::dataset::call_rows::{CallBatch, read_calls};
-use crate::dataset::cursor::Cursor;
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
-use crate::dataset::finding::Validation;
-use crate::dataset::info::{Info, NtpInfo};
-use crate::dataset::read::{check_tree, n_slots};
+use crate::dataset::tables::calls::read::{CallBatch, read_calls};
+use crate::dataset::files::cursor::Cursor;
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::finding::Validation;
+use crate::dataset::files::info::{Info, NtpInfo};
+use crate::dataset::read::trials::{check_tree, n_slots};
 use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
-use crate::dataset::{DatasetError, layout};
+use crate::dataset::DatasetError;
+use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::check::{self as episode, ArgumentBatch, EpisodeCheck};
+use crate::dataset::tables::frames::check::{FrameCheck, FullFrameBatch};
+use crate::dataset::tables::scopes::check::{self as scopes, Labelled, ScopeBatch};
 use crate::trace::ProgramCall;
 
-use episode::{ArgumentBatch, EpisodeCheck};
-use frames::{FrameCheck, FullFrameBatch};
 use meta::Texts;
-use scopes::{Labelled, ScopeBatch};
 
 /// Checks a dataset.
 ///

@@ -8,7 +8,7 @@ use arrow::datatypes::{DataType, SchemaRef};
 
 use crate::dataset::DatasetError;
 use crate::dataset::edit::pieces::Piece;
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 use crate::table::BatchReader;
 
 /// Rows of a batch; fewer where a row may hold a picture.

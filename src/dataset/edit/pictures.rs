@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use arrow::array::{ArrayRef, AsArray as _};
 
 use crate::dataset::DatasetError;
-use crate::dataset::edit::numbers::scalars;
+use crate::dataset::statistics::batches::scalars;
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::{FeatureInfo, Info};
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::{FeatureInfo, Info};
 use crate::dataset::pictures::{PictureMeasure, PictureStatistics, VideoFiles};
 use crate::video::VideoError;
 

@@ -16,10 +16,10 @@ use crate::dataset::edit::samples::video_place;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::edit::target::Target;
 use crate::dataset::edit::{EditError, EditSummary, commit};
-use crate::dataset::episode_rows::EpisodeRows;
-use crate::dataset::feature::Dtype;
-use crate::dataset::finding::{Severity, Validation};
-use crate::dataset::layout;
+use crate::dataset::tables::episodes::read::EpisodeRows;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::finding::{Severity, Validation};
+use crate::dataset::files::layout;
 use crate::dataset::validate::EpisodeChecks;
 
 /// What became of a dataset.
@@ -107,7 +107,7 @@ struct Prefix {
 impl Prefix {
     fn open(
         root: &Path,
-        info: crate::dataset::info::Info,
+        info: crate::dataset::files::info::Info,
         rows: EpisodeRows,
         changed: BTreeMap<PathBuf, String>,
     ) -> Result<Self, EditError> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
 
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 use crate::table::{BatchWriter, TableError, WriteOptions};
 
 /// Writes `FOLDER/chunk-000/file-000.parquet` and its successors.

@@ -8,9 +8,9 @@ use arrow::datatypes::{Float64Type, Int64Type};
 
 use crate::dataset::DatasetError;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::{CameraInfo, Info};
-use crate::dataset::layout::FilePlace;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::{CameraInfo, Info};
+use crate::dataset::files::layout::FilePlace;
 use crate::dataset::pictures::video_columns;
 use crate::video::{Mp4Reader, VideoError};
 

@@ -11,7 +11,7 @@ use serde_json::json;
 use crate::artifact::StagedDir;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::edit::{EditError, EditSummary, write};
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::seed::Seed;
 
 /// Parts that are made at most: each is a pass over the dataset.

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::call_rows::{CallBatch, read_calls};
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
-use crate::dataset::info::Info;
-use crate::dataset::layout;
+use crate::dataset::tables::calls::read::{CallBatch, read_calls};
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::info::Info;
+use crate::dataset::files::layout;
 use crate::dataset::schema::{CALLS, FRAMES};
-use crate::dataset::text::subtask_text;
+use crate::dataset::tables::texts::subtask::subtask_text;
 use crate::table::{Columns, TableError};
 use crate::trace::{ProgramCall, sentence};
 

@@ -15,13 +15,13 @@ use arrow::datatypes::{DataType, Field, Fields};
 use arrow::error::ArrowError;
 
 use crate::dataset::edit::EditError;
-use crate::dataset::episodes::MetaRows;
+use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
 use crate::dataset::export::plain::{copy_files, with_columns, write_frames};
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::FeatureInfo;
-use crate::dataset::layout;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::FeatureInfo;
+use crate::dataset::files::layout;
 use crate::dataset::schema::META_EPISODES;
 
 const PERSISTENT: &str = "language_persistent";

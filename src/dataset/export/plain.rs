@@ -12,11 +12,11 @@ use serde_json::Value;
 use crate::artifact::{IoError, create_dir, read_json, write_json};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
-use crate::dataset::episodes::MetaRows;
+use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
-use crate::dataset::frames::FrameRows;
-use crate::dataset::info::{FeatureInfo, Info, NtpInfo};
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::tables::frames::FrameRows;
+use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
 

@@ -15,11 +15,11 @@ use serde::{Serialize, Serializer};
 
 use crate::artifact::write_json;
 use crate::dataset::edit::EditError;
-use crate::dataset::episodes::MetaRows;
+use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
 use crate::dataset::export::plain::{copy_files, with_columns, write_frames};
-use crate::dataset::layout;
+use crate::dataset::files::layout;
 use crate::dataset::schema::META_EPISODES;
 
 /// Gives the labels of one level.

@@ -11,7 +11,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::export::with_columns;
 use crate::dataset::import::ROOT;
 use crate::dataset::import::rows::AnnotatedRows;
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::FRAMES;
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
 

@@ -8,13 +8,13 @@ use arrow::array::{ArrayRef, AsArray as _, BooleanArray, Int64Array, RecordBatch
 use arrow::datatypes::{DataType, Field};
 
 use crate::artifact::sha256_bytes;
-use crate::dataset::calls::{CallRows, ScopeRows};
+use crate::dataset::tables::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::{copy_files, with_columns};
 use crate::dataset::import::frames::Annotated;
 use crate::dataset::import::{ImportSummary, ROOT};
-use crate::dataset::layout;
-use crate::dataset::rolling::RollingTable;
+use crate::dataset::files::layout;
+use crate::dataset::files::rolling::RollingTable;
 use crate::dataset::schema::{CALLS, EPISODES, META_EPISODES, SCOPES};
 use crate::table::{Column, TableWriter, Values, WriteOptions};
 use crate::trace::Span;

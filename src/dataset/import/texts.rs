@@ -7,7 +7,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type};
 
 use crate::dataset::edit::EditError;
-use crate::dataset::layout;
+use crate::dataset::files::layout;
 use crate::table::BatchReader;
 
 const BATCH_ROWS: usize = 8192;

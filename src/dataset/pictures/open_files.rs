@@ -1,6 +1,6 @@
 //! Files that stay open between reads.
 
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 
 /// Most files that are open at once: well below what systems allow.
 const MAX_OPEN: usize = 64;

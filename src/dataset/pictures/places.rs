@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::pictures::video_columns;
 use crate::dataset::schema::META_EPISODES;
 use crate::table::{self, Columns};

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::Info;
-use crate::dataset::layout;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Info;
+use crate::dataset::files::layout;
 use crate::dataset::pictures::PREFIX;
 use crate::dataset::pictures::open_files::OpenFiles;
 use crate::dataset::pictures::places::{Place, places};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 use crate::dataset::pictures::video_columns;
 use crate::table::Values;
 use crate::video::{Mp4Writer, VideoError};

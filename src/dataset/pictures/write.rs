@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
-use crate::dataset::episode_view::EpisodeView;
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::{CameraInfo, FeatureInfo};
+use crate::dataset::tables::view::EpisodeView;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::{CameraInfo, FeatureInfo};
 use crate::dataset::pictures::statistics::EpisodeStatistics;
 use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
 use crate::recording::CameraPictures;

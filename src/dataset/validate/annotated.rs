@@ -6,15 +6,15 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::call_facts::{CallFacts, CallFactsBatch, read_call_facts};
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
-use crate::dataset::finding::Validation;
+use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::finding::Validation;
 use crate::dataset::import::ROOT;
-use crate::dataset::layout;
+use crate::dataset::files::layout;
 use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
 use crate::dataset::validate::meta::Texts;
-use crate::dataset::validate::scopes::{self, Labelled, ScopeBatch};
+use crate::dataset::tables::scopes::check::{self, Labelled, ScopeBatch};
 use crate::table::{Columns, TableError};
 use crate::trace::Span;
 

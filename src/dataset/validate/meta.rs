@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
-use crate::dataset::feature::{Dtype, FEATURES, Feature};
-use crate::dataset::finding::Validation;
-use crate::dataset::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::files::finding::Validation;
+use crate::dataset::files::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES, SUBTASKS, TASKS};
 use crate::dataset::statistics::FeatureStatistics;
 use crate::dataset::{DatasetError, EpisodePictures};

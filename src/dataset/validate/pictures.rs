@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::dataset::EpisodePictures;
-use crate::dataset::finding::Validation;
+use crate::dataset::files::finding::Validation;
 
 /// Checks the pictures of all cameras.
 pub(super) fn check(root: &Path, validation: &mut Validation) {

@@ -5,11 +5,11 @@ use serde_json::json;
 use crate::artifact::{IoError, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::target::{EditSummary, Target};
-use crate::dataset::feature::FEATURES;
+use crate::dataset::tables::frames::feature::FEATURES;
 use crate::dataset::import::vocabulary;
-use crate::dataset::info::{FeatureInfo, Features, Info, NtpInfo, Stats, declared};
-use crate::dataset::layout;
-use crate::dataset::text_files::{write_subtasks, write_tasks};
+use crate::dataset::files::info::{FeatureInfo, Features, Info, NtpInfo, Stats, declared};
+use crate::dataset::files::layout;
+use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 impl Target {
     /// Ends the dataset. `failed_left_out` is what its sources left out of their recordings.

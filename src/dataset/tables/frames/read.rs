@@ -3,8 +3,8 @@
 use arrow::buffer::{BooleanBuffer, ScalarBuffer};
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::table::{Columns, FloatRows, TableError};
 use crate::trace::GripperState;
 

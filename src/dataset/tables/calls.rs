@@ -1,8 +1,11 @@
 //! The rows of `ntp/calls/` and `ntp/scopes/`: the program tree and the scoping labels derived from it.
 
+pub(crate) mod facts;
+pub(crate) mod read;
+
 use std::iter::repeat_n;
 
-use crate::dataset::episode_view::{CallSpans, EpisodeView};
+use crate::dataset::tables::view::{CallSpans, EpisodeView};
 use crate::program::Program;
 use crate::table::TextTable;
 use crate::table::{Values, WriteOptions};

@@ -7,13 +7,13 @@ use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{DataType, Field, Float32Type, Float64Type, Int64Type, Schema};
 use arrow::error::ArrowError;
 
-use crate::dataset::feature::{Dtype, FEATURES, Feature};
-use crate::dataset::info::Info;
+use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::files::info::Info;
 use crate::dataset::statistics::NumericFeature;
 use crate::table::Values;
 
 /// The features that have statistics, among the columns of the frames.
-pub(in crate::dataset) fn numeric_features(info: &Info, columns: &Schema) -> Vec<NumericFeature> {
+pub(crate) fn numeric_features(info: &Info, columns: &Schema) -> Vec<NumericFeature> {
     let numeric = |name: &str| {
         let (_, declared) = info.features.0.iter().find(|(feature, _)| feature == name)?;
         let is_number = matches!(declared.dtype, Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool);
@@ -31,14 +31,14 @@ pub(in crate::dataset) fn numeric_features(info: &Info, columns: &Schema) -> Vec
 }
 
 /// The flags among the columns of the features, which Arrow keeps as bits.
-pub(in crate::dataset) fn flags(rows: &RecordBatch, features: &[NumericFeature]) -> Vec<Vec<bool>> {
+pub(crate) fn flags(rows: &RecordBatch, features: &[NumericFeature]) -> Vec<Vec<bool>> {
     let of = |feature: &NumericFeature| rows.column_by_name(&feature.name)?.as_boolean_opt();
     let flags = |feature: &NumericFeature| of(feature).map(|column| column.values().iter().collect());
     features.iter().map(|feature| flags(feature).unwrap_or_default()).collect()
 }
 
 /// The columns of the features. Each must be there and of its kind.
-pub(in crate::dataset) fn values<'r>(
+pub(crate) fn values<'r>(
     rows: &'r RecordBatch,
     features: &'r [NumericFeature],
     flags: &'r [Vec<bool>],
@@ -105,7 +105,7 @@ fn vectors<'r>(
 }
 
 /// Single numbers as a column; `None` for anything else.
-pub(super) fn scalars(values: Values<'_>) -> Option<ArrayRef> {
+pub(crate) fn scalars(values: Values<'_>) -> Option<ArrayRef> {
     match values {
         Values::Int64(values) => Some(Arc::new(Int64Array::from(values.to_vec()))),
         Values::Float64(values) => Some(Arc::new(Float64Array::from(values.to_vec()))),
@@ -114,7 +114,7 @@ pub(super) fn scalars(values: Values<'_>) -> Option<ArrayRef> {
 }
 
 /// Lists of one length as a column of a field.
-pub(super) fn lists(field: &Field, values: Values<'_>) -> Result<ArrayRef, ArrowError> {
+pub(crate) fn lists(field: &Field, values: Values<'_>) -> Result<ArrayRef, ArrowError> {
     let (numbers, width): (ArrayRef, usize) = match values {
         Values::Float64Vector(values, width) => (Arc::new(Float64Array::from(values.to_vec())), width),
         Values::Int64Vector(values, width) => (Arc::new(Int64Array::from(values.to_vec())), width),

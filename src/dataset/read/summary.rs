@@ -6,9 +6,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::artifact::read_json;
-use crate::dataset::episode_rows::EpisodeRows;
-use crate::dataset::info::NtpInfo;
-use crate::dataset::{DatasetError, layout};
+use crate::dataset::tables::episodes::read::EpisodeRows;
+use crate::dataset::files::info::NtpInfo;
+use crate::dataset::DatasetError;
+use crate::dataset::files::layout;
 
 /// What a dataset is made of.
 #[derive(Clone, Debug, PartialEq, Serialize)]

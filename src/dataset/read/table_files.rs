@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::info::{Info, NtpInfo};
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::files::info::{Info, NtpInfo};
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, SCOPES, SUBTASKS, TASKS};
 use crate::table::{TableReader, TableSchema};
 

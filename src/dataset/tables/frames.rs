@@ -2,10 +2,15 @@
 //!
 //! Rows of several episodes are gathered until they are worth a row group; then the buffers begin anew.
 
-use crate::dataset::episode_view::EpisodeView;
-use crate::dataset::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
-use crate::dataset::program_paths::ProgramPaths;
-use crate::dataset::text::subtask_text;
+pub(crate) mod check;
+pub(crate) mod feature;
+pub(crate) mod paths;
+pub(crate) mod read;
+
+use crate::dataset::tables::view::EpisodeView;
+use crate::dataset::tables::frames::feature::{ACTION_NAMES, Dtype, FEATURES, Width};
+use crate::dataset::tables::frames::paths::ProgramPaths;
+use crate::dataset::tables::texts::subtask::subtask_text;
 use crate::table::{TextTable, Values, WriteOptions};
 use crate::trace::{Frame, Observation};
 

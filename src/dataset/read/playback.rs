@@ -9,12 +9,12 @@ use arrow::compute::concat_batches;
 use arrow::datatypes::Float32Type;
 
 use crate::artifact::read_json;
-use crate::dataset::edit::numbers::{flags, numeric_features, values};
-use crate::dataset::episode_rows::EpisodeRow;
-use crate::dataset::feature::Dtype;
-use crate::dataset::info::{FeatureInfo, Info, NtpInfo};
-use crate::dataset::layout::{self, FilePlace};
-use crate::dataset::lookup::{episode_facts, find, read_calls};
+use crate::dataset::statistics::batches::{flags, numeric_features, values};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
+use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::read::lookup::{episode_facts, find, read_calls};
 use crate::dataset::pictures::{PREFIX, video_columns};
 use crate::dataset::schema::META_EPISODES;
 use crate::dataset::statistics::{NumericFeature, copy_values};

@@ -5,19 +5,19 @@ use std::path::Path;
 use arrow::buffer::{BooleanBuffer, ScalarBuffer};
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::EpisodeRow;
-use crate::dataset::feature::ACTION_NAMES;
-use crate::dataset::finding::Validation;
-use crate::dataset::frame_rows::FrameBatch;
-use crate::dataset::layout;
-use crate::dataset::program_paths::ProgramPaths;
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::frames::feature::ACTION_NAMES;
+use crate::dataset::files::finding::Validation;
+use crate::dataset::tables::frames::read::FrameBatch;
+use crate::dataset::files::layout;
+use crate::dataset::tables::frames::paths::ProgramPaths;
 use crate::dataset::validate::meta::Texts;
 use crate::table::{Columns, FloatRows, Form, TableError, TextRows};
 use crate::trace::{Observation, ProgramCall};
 
 /// Every column of `data/`.
-pub(super) struct FullFrameBatch {
+pub(crate) struct FullFrameBatch {
     base: FrameBatch,
     action: FloatRows,
     timestamp: Vec<f32>,
@@ -88,7 +88,7 @@ impl Before {
 }
 
 /// Checks the frames of one episode after another.
-pub(super) struct FrameCheck {
+pub(crate) struct FrameCheck {
     width: usize,
     fps: u32,
     paths: ProgramPaths,
@@ -114,13 +114,13 @@ impl StateRange {
 }
 
 impl FrameCheck {
-    pub(super) fn new(n_slots: usize, fps: u32) -> Self {
+    pub(crate) fn new(n_slots: usize, fps: u32) -> Self {
         let (width, fps) = (Observation::width(n_slots), fps.max(1));
         Self { width, fps, paths: ProgramPaths::default(), range: StateRange::default() }
     }
 
     /// Checks the frames of an episode. Labels are checked when its calls are there.
-    pub(super) fn check(
+    pub(crate) fn check(
         &mut self,
         cursor: &mut Cursor<FullFrameBatch>,
         row: &EpisodeRow,
@@ -193,7 +193,7 @@ impl FrameCheck {
     }
 
     /// Compares what was seen with `meta/stats.json`.
-    pub(super) fn compare_ranges(&self, root: &Path, texts: &Texts, validation: &mut Validation) {
+    pub(crate) fn compare_ranges(&self, root: &Path, texts: &Texts, validation: &mut Validation) {
         let Some((min, max)) = &texts.state_range else { return };
         // As floats: they were, before they became decimals.
         let stated = min.iter().zip(max).map(|(min, max)| (*min as f32, *max as f32));

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::info::Info;
-use crate::dataset::layout::{self, FilePlace};
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::files::info::Info;
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{EPISODES, META_EPISODES};
 use crate::table::{Columns, TableError, TableReader};
 

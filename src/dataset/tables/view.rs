@@ -2,7 +2,7 @@
 
 use crate::dataset::ConvertError;
 use crate::dataset::config::FrameChoice;
-use crate::dataset::frame_map::FrameMap;
+use crate::dataset::tables::map::FrameMap;
 use crate::trace::{Actor, Boundaries, Episode, Frame, Span};
 
 /// The spans of one call, counted in rows.

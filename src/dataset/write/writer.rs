@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::artifact::{IoError, create_dir};
 use crate::dataset::ConvertError;
 use crate::dataset::config::{ConvertConfig, FailedEpisodes, FrameChoice};
-use crate::dataset::episode_view::{EpisodeView, ViewBuffers};
-use crate::dataset::episodes::Source;
-use crate::dataset::tables::Tables;
+use crate::dataset::tables::view::{EpisodeView, ViewBuffers};
+use crate::dataset::tables::episodes::Source;
+use crate::dataset::write::sheaf::Tables;
 use crate::recording::{CameraPictures, Pictured};
 use crate::trace::{Boundaries, Episode};
 

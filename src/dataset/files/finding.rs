@@ -58,7 +58,7 @@ impl Validation {
         self.findings_left_out == 0 && self.findings.iter().all(|finding| finding.severity == Severity::Warning)
     }
 
-    pub(super) fn add(&mut self, finding: Finding) {
+    pub(crate) fn add(&mut self, finding: Finding) {
         if self.findings.len() < MAX_FINDINGS {
             self.findings.push(finding);
         } else {
@@ -66,16 +66,16 @@ impl Validation {
         }
     }
 
-    pub(super) fn error(&mut self, code: &'static str, path: &Path, place: String, message: String) {
+    pub(crate) fn error(&mut self, code: &'static str, path: &Path, place: String, message: String) {
         self.add(Finding { code, severity: Severity::Error, path: path.to_owned(), place, message });
     }
 
-    pub(super) fn warn(&mut self, code: &'static str, path: &Path, place: String, message: String) {
+    pub(crate) fn warn(&mut self, code: &'static str, path: &Path, place: String, message: String) {
         self.add(Finding { code, severity: Severity::Warning, path: path.to_owned(), place, message });
     }
 
     /// Takes down what kept a table from being read on. `code` is for its rows.
-    pub(super) fn failed(&mut self, code: &'static str, error: &DatasetError) {
+    pub(crate) fn failed(&mut self, code: &'static str, error: &DatasetError) {
         let (code, path, place, message) = match error {
             DatasetError::Table(error) => return self.unreadable(error),
             DatasetError::Io(error) => {

@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::call_facts::{CallFacts, CallFactsBatch, read_call_facts};
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::{EpisodeRow, EpisodeRows};
-use crate::dataset::info::NtpInfo;
-use crate::dataset::layout::{self, EPISODES, FilePlace};
+use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::info::NtpInfo;
+use crate::dataset::files::layout::{self, EPISODES, FilePlace};
 use crate::dataset::schema::{CALLS, FRAMES};
 use crate::table::{Columns, TableError};
 
@@ -152,7 +152,7 @@ pub fn look_up(
 }
 
 /// The calls of an episode that was found.
-pub(super) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, DatasetError> {
+pub(crate) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, DatasetError> {
     let mut cursor = Cursor::<CallFactsBatch>::new(root, layout::CALLS, CALLS);
     let mut n_before = usize::try_from(found.calls_before).unwrap_or(0);
     while n_before > 0 {
@@ -162,14 +162,14 @@ pub(super) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, D
 }
 
 /// An episode, and how many rows lie before its own in the files of calls and frames.
-pub(super) struct Found {
-    pub(super) row: EpisodeRow,
+pub(crate) struct Found {
+    pub(crate) row: EpisodeRow,
     calls_before: i64,
-    pub(super) frames_before: i64,
+    pub(crate) frames_before: i64,
 }
 
 /// Finds an episode by its number.
-pub(super) fn find(root: &Path, episode: u64) -> Result<Found, DatasetError> {
+pub(crate) fn find(root: &Path, episode: u64) -> Result<Found, DatasetError> {
     let (info, rows) = EpisodeRows::open(root)?;
     let (mut calls, mut frames) = ((None, 0), (None, 0));
     for row in rows {
@@ -242,7 +242,7 @@ fn stack(calls: &[CallFacts], deepest: i64) -> Vec<CallFacts> {
     stack
 }
 
-pub(super) fn episode_facts(row: EpisodeRow, calls: Vec<CallFacts>) -> EpisodeFacts {
+pub(crate) fn episode_facts(row: EpisodeRow, calls: Vec<CallFacts>) -> EpisodeFacts {
     EpisodeFacts {
         episode_index: row.episode_index,
         task_id: row.task_id,

@@ -1,7 +1,10 @@
 //! The rows per episode: `ntp/episodes.parquet` (provenance) and `meta/episodes/` (what `LeRobot` reads).
 
-use crate::dataset::episode_view::{EpisodeView, is_own_specification};
-use crate::dataset::layout::FilePlace;
+pub(crate) mod check;
+pub(crate) mod read;
+
+use crate::dataset::tables::view::{EpisodeView, is_own_specification};
+use crate::dataset::files::layout::FilePlace;
 use crate::table::{Values, WriteOptions};
 
 /// Where the rows of an episode are.

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::ser::SerializeMap as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::dataset::feature::{Dtype, FEATURES, Feature};
-use crate::dataset::layout::CHUNK_FILES;
+use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::files::layout::CHUNK_FILES;
 use crate::dataset::pictures::PictureStatistics;
 use crate::dataset::statistics::FeatureStatistics;
 

@@ -4,17 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::EpisodeRow;
-use crate::dataset::finding::Validation;
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::files::finding::Validation;
+use crate::dataset::files::layout::FilePlace;
 use crate::table::{Columns, Form, TableError, TextRows};
 use crate::task::{Family, Split};
 use crate::trace::{Cause, ProgramCall, sentence};
 
 /// What the episodes so far said of their tasks.
 #[derive(Default)]
-pub(super) struct EpisodeCheck {
+pub(crate) struct EpisodeCheck {
     /// By task id: split and text.
     tasks: BTreeMap<String, (String, String)>,
     /// By task text: split.
@@ -24,11 +24,11 @@ pub(super) struct EpisodeCheck {
 
 impl EpisodeCheck {
     /// The files of frames that episodes name.
-    pub(super) fn data_places(&self) -> &BTreeSet<FilePlace> {
+    pub(crate) fn data_places(&self) -> &BTreeSet<FilePlace> {
         &self.data_places
     }
 
-    pub(super) fn check(&mut self, path: &Path, row: &EpisodeRow, n_slots: usize, validation: &mut Validation) {
+    pub(crate) fn check(&mut self, path: &Path, row: &EpisodeRow, n_slots: usize, validation: &mut Validation) {
         let place = || format!("episode {}", row.episode_index);
         for problem in problems_of(row, n_slots) {
             validation.error("episodes.value", path, place(), problem);
@@ -94,7 +94,7 @@ fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
 }
 
 /// Names and sentences in `ntp/calls/`.
-pub(super) struct ArgumentBatch {
+pub(crate) struct ArgumentBatch {
     argument: TextRows,
     instruction: TextRows,
 }
@@ -109,7 +109,7 @@ impl Batch for ArgumentBatch {
 }
 
 /// Holds the names against the episode's slots, and the sentences against the calls.
-pub(super) fn check_arguments(
+pub(crate) fn check_arguments(
     cursor: &mut Cursor<ArgumentBatch>,
     row: &EpisodeRow,
     calls: &[ProgramCall],

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::dataset::DatasetError;
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 use crate::table::{Columns, TableError, TableReader, TableSchema};
 
 /// Columns of a batch of rows.

@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use crate::dataset::layout;
+use crate::dataset::files::layout;
 use crate::dataset::schema::{SUBTASKS, TASKS};
 use crate::table::{TableError, TableSchema, TableWriter, Values, WriteOptions};
 
 /// Writes `meta/tasks.parquet`.
-pub(super) fn write_tasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
+pub(crate) fn write_tasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
     let metadata = pandas_index("task_index", "__index_level_0__", None);
     write_texts(root, layout::TASKS, TASKS, ["task_index", "__index_level_0__"], texts, metadata)
 }
 
 /// Writes `meta/subtasks.parquet`.
-pub(super) fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
+pub(crate) fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
     let metadata = pandas_index("subtask_index", "subtask", Some("subtask"));
     write_texts(root, layout::SUBTASKS, SUBTASKS, ["subtask_index", "subtask"], texts, metadata)
 }

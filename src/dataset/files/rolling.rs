@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::dataset::layout::FilePlace;
+use crate::dataset::files::layout::FilePlace;
 use crate::table::{TableError, TableSchema, TableWriter, Values, WriteOptions};
 
 /// Writes `FOLDER/chunk-000/file-000.parquet` and its successors.

@@ -4,8 +4,8 @@ use arrow::buffer::ScalarBuffer;
 use serde::Serialize;
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor};
-use crate::dataset::episode_rows::EpisodeRow;
+use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::table::{Columns, Form, TableError, TextRows};
 
 /// One program call.
@@ -30,7 +30,7 @@ pub struct CallFacts {
 }
 
 /// Columns of `ntp/calls/`.
-pub(super) struct CallFactsBatch {
+pub(crate) struct CallFactsBatch {
     /// `episode_index`, `call_id`, `depth`.
     numbers: [ScalarBuffer<i64>; 3],
     caller_id: Vec<Option<i64>>,
@@ -94,7 +94,7 @@ impl CallFactsBatch {
 }
 
 /// Reads the calls of the next episode.
-pub(super) fn read_call_facts(
+pub(crate) fn read_call_facts(
     cursor: &mut Cursor<CallFactsBatch>,
     row: &EpisodeRow,
 ) -> Result<Vec<CallFacts>, DatasetError> {

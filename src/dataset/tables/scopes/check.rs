@@ -8,14 +8,14 @@ use std::ops::Range;
 use arrow::buffer::{BooleanBuffer, ScalarBuffer};
 
 use crate::dataset::DatasetError;
-use crate::dataset::cursor::{Batch, Cursor, Rows};
-use crate::dataset::episode_rows::EpisodeRow;
-use crate::dataset::finding::Validation;
+use crate::dataset::files::cursor::{Batch, Cursor, Rows};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::files::finding::Validation;
 use crate::table::{Columns, TableError};
 use crate::trace::Span;
 
 /// Every column of `ntp/scopes/`.
-pub(super) struct ScopeBatch {
+pub(crate) struct ScopeBatch {
     episode_index: ScalarBuffer<i64>,
     call_id: ScalarBuffer<i64>,
     specification_frame: ScalarBuffer<i64>,
@@ -41,16 +41,16 @@ impl Batch for ScopeBatch {
 }
 
 /// A call that has labels.
-pub(super) struct Labelled {
-    pub(super) call: u32,
+pub(crate) struct Labelled {
+    pub(crate) call: u32,
     /// The frames that are labelled.
-    pub(super) input: Span,
+    pub(crate) input: Span,
     /// Those inside.
-    pub(super) output: Span,
+    pub(crate) output: Span,
 }
 
 /// Checks the labels of an episode.
-pub(super) fn check(
+pub(crate) fn check(
     cursor: &mut Cursor<ScopeBatch>,
     row: &EpisodeRow,
     calls: impl IntoIterator<Item = Labelled>,
