@@ -32,10 +32,9 @@ mod values;
 mod words;
 mod write;
 
-pub(crate) use arrays::{FloatRows, TextRows};
 pub(crate) use batches::{BatchReader, BatchWriter};
 pub use column::{Column, Columns};
-pub(crate) use declare::{TableRows, column_name, schema, table};
+pub(crate) use declare::{Batch, DeclaredColumn, TableRows, batch, column_name, table};
 pub use error::TableError;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};

@@ -25,7 +25,6 @@ mod pictures;
 mod pieces;
 mod renumber;
 mod repair;
-mod rolling;
 mod samples;
 mod source;
 mod split;

@@ -20,27 +20,22 @@ mod frames;
 mod rows;
 mod texts;
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::artifact::{IoError, StagedDir, read_json, sha256_bytes, write_json};
+use crate::artifact::{IoError, StagedDir, read_json, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
 use crate::dataset::files::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout;
+use crate::dataset::tables::annotated::{ANNOTATED_BY, vocabulary};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 use frames::write_frames;
 use rows::{AnnotatedRows, write_meta};
 use texts::{read_subtasks, read_tasks};
-
-/// Name of the root program.
-pub(crate) const ROOT: &str = "task";
-/// What a dataset that was annotated elsewhere says in `ntp/info.json`.
-pub(crate) const ANNOTATED_BY: &str = "subtask_index";
 
 /// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -102,15 +97,6 @@ fn read_info(root: &Path) -> Result<Value, EditError> {
         return refused("import.annotation", format!("it has the feature {name} already"));
     }
     Ok(info)
-}
-
-/// The programs of annotated episodes, in an order that does not depend on that of the episodes, with the hash that
-/// names them.
-pub(crate) fn vocabulary(subtasks: &[String]) -> (Vec<String>, String) {
-    let texts: BTreeSet<&String> = subtasks.iter().collect();
-    let programs: Vec<String> = std::iter::once(ROOT.to_owned()).chain(texts.into_iter().cloned()).collect();
-    let hash = sha256_bytes(programs.join("\n").as_bytes())[..16].to_owned();
-    (programs, hash)
 }
 
 fn write_texts(root: &Path, to: &Path, tasks: &[String], subtasks: &[String]) -> Result<(), EditError> {

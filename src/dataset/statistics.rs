@@ -17,7 +17,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::IoError;
-use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::files::info::Dtype;
+use crate::dataset::tables::frames::feature::{FEATURES, Feature};
 use crate::table::Values;
 
 pub(in crate::dataset) use number::copy_values;

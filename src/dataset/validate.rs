@@ -10,21 +10,20 @@ mod pictures;
 use std::path::Path;
 
 use crate::artifact::read_json;
-use crate::dataset::tables::calls::read::{CallBatch, read_calls};
+use crate::dataset::DatasetError;
 use crate::dataset::files::cursor::Cursor;
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::info::{Info, NtpInfo};
-use crate::dataset::read::trials::{check_tree, n_slots};
-use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
-use crate::dataset::DatasetError;
 use crate::dataset::files::layout;
-use crate::dataset::tables::episodes::check::{self as episode, ArgumentBatch, EpisodeCheck};
+use crate::dataset::tables::calls::check::{ArgumentBatch, check_arguments, check_tree};
+use crate::dataset::tables::calls::read::{CallBatch, read_calls};
+use crate::dataset::tables::episodes::check::EpisodeCheck;
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::tables::frames::check::{FrameCheck, FullFrameBatch};
+use crate::dataset::tables::frames::feature::n_slots;
 use crate::dataset::tables::scopes::check::{self as scopes, Labelled, ScopeBatch};
+use crate::dataset::tables::texts::read::{Texts, read_all_texts};
 use crate::trace::ProgramCall;
-
-use meta::Texts;
 
 /// Checks a dataset.
 ///
@@ -35,7 +34,7 @@ pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
     let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
     if info.is_ok_and(|info| info.annotated_by.is_some()) {
-        let texts = meta::read_all_texts(root, &mut validation);
+        let texts = read_all_texts(root, &mut validation);
         if let Err(error) = annotated::check(root, &texts, &mut validation) {
             validation.failed("episodes.row", &error);
         }
@@ -87,10 +86,10 @@ impl EpisodeChecks {
     fn with_texts(root: &Path, info: &Info, texts: Texts) -> Result<Self, DatasetError> {
         let n_slots = n_slots(root, info)?;
         let tables = Tables {
-            frames: Some(Cursor::new(root, layout::DATA, FRAMES)),
-            calls: Some(Cursor::new(root, layout::CALLS, CALLS)),
-            arguments: Some(Cursor::new(root, layout::CALLS, CALLS)),
-            scopes: Some(Cursor::new(root, layout::SCOPES, SCOPES)),
+            frames: Some(Cursor::new(root, layout::DATA)),
+            calls: Some(Cursor::new(root, layout::CALLS)),
+            arguments: Some(Cursor::new(root, layout::CALLS)),
+            scopes: Some(Cursor::new(root, layout::SCOPES)),
         };
         let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.fps));
         Ok(Self { n_slots, texts, tables, episodes, frames, calls: Vec::new() })
@@ -135,7 +134,7 @@ impl Tables {
             validation.error("calls.tree", &cursor.path(), place, problem);
         }
         if let Some(arguments) = &mut self.arguments
-            && let Err(error) = episode::check_arguments(arguments, row, calls, validation)
+            && let Err(error) = check_arguments(arguments, row, calls, validation)
         {
             validation.failed("calls.row", &error);
             self.arguments = None;

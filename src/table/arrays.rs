@@ -1,6 +1,6 @@
 //! Arrow arrays as columns: copied into vectors, or taken as they lie in memory.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array, StringArray};
 use arrow::buffer::{BooleanBuffer, OffsetBuffer, ScalarBuffer};
 use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
 
@@ -22,6 +22,17 @@ impl<T: ArrowNativeType> ListRows<T> {
 
 /// Lists of floats.
 pub(crate) type FloatRows = ListRows<f32>;
+
+/// Whole numbers one after another, as they lie in a batch; some rows have none.
+#[derive(Clone, Debug)]
+pub(crate) struct NumberRows(Int64Array);
+
+impl NumberRows {
+    /// The number of a row.
+    pub(crate) fn get(&self, at: usize) -> Option<i64> {
+        self.0.is_valid(at).then(|| self.0.value(at))
+    }
+}
 
 /// Texts one after another, as they lie in a batch.
 #[derive(Clone, Debug)]
@@ -53,8 +64,35 @@ impl Columns {
         self.take_array(name, expected, |_, array| Some(array.as_boolean_opt()?.values().clone()))
     }
 
+    /// Takes whole numbers out, of which some rows may have none.
+    pub(crate) fn optional_numbers(&mut self, name: &str) -> Result<NumberRows, TableError> {
+        let expected = ColumnKind { value: Value::Int64, form: Form::Optional };
+        self.take_array(name, expected, |_, array| Some(NumberRows(array.as_primitive_opt::<Int64Type>()?.clone())))
+    }
+
+    /// Takes floats out.
+    pub(crate) fn floats(&mut self, name: &str) -> Result<ScalarBuffer<f32>, TableError> {
+        let expected = ColumnKind { value: Value::Float32, form: Form::Required };
+        self.take_array(name, expected, |_, array| Some(array.as_primitive_opt::<Float32Type>()?.values().clone()))
+    }
+
+    /// Takes doubles out.
+    pub(crate) fn doubles(&mut self, name: &str) -> Result<ScalarBuffer<f64>, TableError> {
+        let expected = ColumnKind { value: Value::Float64, form: Form::Required };
+        self.take_array(name, expected, |_, array| Some(array.as_primitive_opt::<Float64Type>()?.values().clone()))
+    }
+
+    /// Takes texts out.
+    pub(crate) fn texts(&mut self, name: &str) -> Result<TextRows, TableError> {
+        self.text_rows(name, Form::Required)
+    }
+
     /// Takes texts out, of which some rows may have none.
-    pub(crate) fn text_rows(&mut self, name: &str, form: Form) -> Result<TextRows, TableError> {
+    pub(crate) fn optional_texts(&mut self, name: &str) -> Result<TextRows, TableError> {
+        self.text_rows(name, Form::Optional)
+    }
+
+    fn text_rows(&mut self, name: &str, form: Form) -> Result<TextRows, TableError> {
         let expected = ColumnKind { value: Value::Text, form };
         self.take_array(name, expected, |_, array| Some(TextRows(array.as_string_opt::<i32>()?.clone())))
     }

@@ -14,8 +14,8 @@
 //! }
 //! ```
 //!
-//! It gives `SCHEMA`, `Row` (one value a column) and `Rows` (one buffer a column, see [`TableRows`]). A column is called
-//! as its field, unless another name stands behind it. The kinds of columns are in [`crate::table::kinds`]. A word behind
+//! It gives `SCHEMA`, `Row` (one value a column) and `Rows` (one buffer a column, see [`TableRows`]); `batch!` then names
+//! columns that are read together. A column is called as its field, unless another name stands behind it. The kinds of columns are in [`crate::table::kinds`]. A word behind
 //! the kind is a method of [`crate::table::ColumnSpec`]: `later` for a column that files of earlier versions lack, `plain`
 //! and `delta` for how its numbers are stored. `sorted_by(…)` behind the table's name says how rows are sorted. Columns of
 //! a second block, `each(names) { … }`, are there once for each name that the function gives, in place of the `*`.
@@ -25,6 +25,7 @@
 
 use std::path::Path;
 
+use crate::table::kinds::Kind;
 use crate::table::read::read;
 use crate::table::write::TableWriter;
 use crate::table::{Columns, TableError, TableSchema, Values};
@@ -41,6 +42,14 @@ pub(crate) trait TableRows: Default {
 
     /// Adds the rows of others at the end.
     fn append(&mut self, others: Self);
+
+    /// Forgets all rows, but not the words of columns that keep each once.
+    fn clear(&mut self);
+
+    /// How many rows there are.
+    fn n_rows(&self) -> usize {
+        self.columns().first().map_or(0, |(_, values)| values.n_rows())
+    }
 
     /// The columns of all rows, in the order of the declaration.
     fn columns(&self) -> Vec<(&'static str, Values<'_>)>;
@@ -72,13 +81,38 @@ macro_rules! table {
             $(#[doc = $each_meaning:literal])* $each:literal: $each_kind:ident,
         )*})?
     ) => {
-        $crate::table::schema! {
-            $(#[doc = $about])*
-            SCHEMA = $table $(sorted_by($($by),*))? {
-                $($(#[doc = $meaning])* $field $(($name))?: $kind $($mark)*,)*
+        $(#[doc = $about])*
+        pub const SCHEMA: $crate::table::TableSchema = $crate::table::TableSchema::new(
+            stringify!($table),
+            concat!($($about, "\n"),*),
+            &[$(
+                $crate::table::ColumnSpec::new(
+                    <column::$field as $crate::table::DeclaredColumn>::NAME,
+                    <$crate::table::kinds::$kind as $crate::table::kinds::Kind>::KIND,
+                    concat!($($meaning),*),
+                )$(.$mark())*,
+            )*],
+        )
+        $(.sorted_by(&[$($by),*]))?
+        $(.each($names, &[$(
+            $crate::table::ColumnSpec::new(
+                $each,
+                <$crate::table::kinds::$each_kind as $crate::table::kinds::Kind>::KIND,
+                concat!($($each_meaning),*),
+            ),
+        )*]))?;
+
+        /// The columns of the table, a type each.
+        #[expect(non_camel_case_types, reason = "a column's type is called as its field")]
+        pub(crate) mod column {$(
+            $(#[doc = $meaning])*
+            pub(crate) enum $field {}
+
+            impl $crate::table::DeclaredColumn for $field {
+                type Kind = $crate::table::kinds::$kind;
+                const NAME: &'static str = $crate::table::column_name!($field $($name)?);
             }
-            $(each($names) {$($(#[doc = $each_meaning])* $each: $each_kind,)*})?
-        }
+        )*}
 
         /// One row of the table.
         pub(crate) struct Row<'a> {$(
@@ -108,9 +142,13 @@ macro_rules! table {
                 );)*
             }
 
+            fn clear(&mut self) {
+                $(<$crate::table::kinds::$kind as $crate::table::kinds::Kind>::clear(&mut self.$field);)*
+            }
+
             fn columns(&self) -> Vec<(&'static str, $crate::table::Values<'_>)> {
                 vec![$((
-                    $crate::table::column_name!($field $($name)?),
+                    <column::$field as $crate::table::DeclaredColumn>::NAME,
                     <$crate::table::kinds::$kind as $crate::table::kinds::Kind>::values(&self.$field),
                 )),*]
             }
@@ -119,7 +157,7 @@ macro_rules! table {
                 Ok(Self {$(
                     $field: <$crate::table::kinds::$kind as $crate::table::kinds::Kind>::read(
                         columns,
-                        $crate::table::column_name!($field $($name)?),
+                        <column::$field as $crate::table::DeclaredColumn>::NAME,
                     )?,
                 )*})
             }
@@ -127,37 +165,54 @@ macro_rules! table {
     };
 }
 
-/// The contract of a table alone, as a constant.
-macro_rules! schema {
+/// Some columns of a declared table, taken out of a batch as they lie in memory.
+pub(crate) trait Batch: Sized {
+    /// The table.
+    const SCHEMA: TableSchema;
+    /// Names of the columns that are read.
+    const COLUMNS: &'static [&'static str];
+
+    /// Takes the columns.
+    fn take(columns: &mut Columns) -> Result<Self, TableError>;
+}
+
+/// A column of a declared table, as a type.
+pub(crate) trait DeclaredColumn {
+    /// What it holds.
+    type Kind: Kind;
+    /// Its name in files.
+    const NAME: &'static str;
+}
+
+/// Declares a [`Batch`]: `batch! { struct Ids of calls { episode_index, call_id } }`, where `calls` is the table's room.
+macro_rules! batch {
     (
-        $(#[doc = $about:literal])*
-        $constant:ident = $table:ident $(sorted_by($($by:literal),*))? {
-            $($(#[doc = $meaning:literal])* $field:ident $(($name:literal))?: $kind:ident $($mark:ident)*,)*
+        $(#[$doc:meta])*
+        $visibility:vis struct $batch:ident of $table:ident {
+            $($(#[$field_doc:meta])* $field_visibility:vis $field:ident),* $(,)?
         }
-        $(each($names:path) {$(
-            $(#[doc = $each_meaning:literal])* $each:literal: $each_kind:ident,
-        )*})?
     ) => {
-        $(#[doc = $about])*
-        pub const $constant: $crate::table::TableSchema = $crate::table::TableSchema::new(
-            stringify!($table),
-            concat!($($about, "\n"),*),
-            &[$(
-                $crate::table::ColumnSpec::new(
-                    $crate::table::column_name!($field $($name)?),
-                    <$crate::table::kinds::$kind as $crate::table::kinds::Kind>::KIND,
-                    concat!($($meaning),*),
-                )$(.$mark())*,
-            )*],
-        )
-        $(.sorted_by(&[$($by),*]))?
-        $(.each($names, &[$(
-            $crate::table::ColumnSpec::new(
-                $each,
-                <$crate::table::kinds::$each_kind as $crate::table::kinds::Kind>::KIND,
-                concat!($($each_meaning),*),
-            ),
-        )*]))?;
+        $(#[$doc])*
+        $visibility struct $batch {$(
+            $(#[$field_doc])*
+            $field_visibility $field: <
+                <$table::column::$field as $crate::table::DeclaredColumn>::Kind as $crate::table::kinds::Kind
+            >::Taken,
+        )*}
+
+        impl $crate::table::Batch for $batch {
+            const SCHEMA: $crate::table::TableSchema = $table::SCHEMA;
+            const COLUMNS: &'static [&'static str] =
+                &[$(<$table::column::$field as $crate::table::DeclaredColumn>::NAME),*];
+
+            fn take(columns: &mut $crate::table::Columns) -> Result<Self, $crate::table::TableError> {
+                Ok(Self {$(
+                    $field: <
+                        <$table::column::$field as $crate::table::DeclaredColumn>::Kind as $crate::table::kinds::Kind
+                    >::take(columns, <$table::column::$field as $crate::table::DeclaredColumn>::NAME)?,
+                )*})
+            }
+        }
     };
 }
 
@@ -171,4 +226,4 @@ macro_rules! column_name {
     };
 }
 
-pub(crate) use {column_name, schema, table};
+pub(crate) use {batch, column_name, table};

@@ -7,10 +7,10 @@ use sha2::{Digest as _, Sha256};
 
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::source::{FILES, Source};
-use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{CameraInfo, FeatureInfo, LEROBOT_VERSION, NTP_VERSION};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::program::vocabulary_hash;
 
 /// Whether a dataset is one that this version can edit.

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use arrow::array::{ArrayRef, AsArray as _};
 
 use crate::dataset::DatasetError;
-use crate::dataset::statistics::batches::scalars;
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{FeatureInfo, Info};
 use crate::dataset::pictures::{PictureMeasure, PictureStatistics, VideoFiles};
+use crate::dataset::statistics::batches::scalars;
 use crate::video::VideoError;
 
 /// The picture features of a dataset that is made of others.

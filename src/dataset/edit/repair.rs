@@ -16,10 +16,10 @@ use crate::dataset::edit::samples::video_place;
 use crate::dataset::edit::source::{Source, SourceEpisode};
 use crate::dataset::edit::target::Target;
 use crate::dataset::edit::{EditError, EditSummary, commit};
-use crate::dataset::tables::episodes::read::EpisodeRows;
-use crate::dataset::tables::frames::feature::Dtype;
 use crate::dataset::files::finding::{Severity, Validation};
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::read::EpisodeRows;
 use crate::dataset::validate::EpisodeChecks;
 
 /// What became of a dataset.

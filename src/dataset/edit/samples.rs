@@ -8,7 +8,7 @@ use arrow::datatypes::{Float64Type, Int64Type};
 
 use crate::dataset::DatasetError;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{CameraInfo, Info};
 use crate::dataset::files::layout::FilePlace;
 use crate::dataset::pictures::video_columns;

@@ -10,10 +10,10 @@ use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::cursor::{BatchCursor, TableFiles};
 use crate::dataset::edit::pieces::Piece;
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::files::info::{Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::SUBTASKS;
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::table;
 
 /// The tables of a dataset, each with something for it.

@@ -11,25 +11,22 @@ use arrow::datatypes::Int64Type;
 use serde_json::Value;
 
 use crate::artifact::read_json;
-use crate::dataset::tables::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::cursor::BatchCursor;
-use crate::dataset::statistics::batches::{flags, lists, numeric_features, values};
 use crate::dataset::edit::pictures::CarriedPictures;
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::renumber::{Renumbered, replace};
-use crate::dataset::edit::rolling::RollingBatches;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::episodes::MetaRows;
-use crate::dataset::tables::frames::FrameRows;
 use crate::dataset::files::info::{Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::files::rolling::Rolling;
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
+use crate::dataset::statistics::batches::{flags, lists, numeric_features, values};
 use crate::dataset::statistics::{NumericFeature, Statistics};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::frames::write::FrameRows;
 use crate::dataset::write::sheaf::{EPISODE_GROUP_ROWS, GROUP_ROWS, MEGABYTE, SCOPE_GROUP_ROWS};
-use crate::table::TextTable;
-use crate::table::{BatchWriter, WriteOptions};
+use crate::table::{BatchWriter, TableSchema, TextTable, WriteOptions};
 use crate::task::Family;
 
 /// Rows that hold pictures make a row group when they are this large.
@@ -99,10 +96,10 @@ pub(super) struct Target {
     scopes: Renumbered<1>,
     meta: Renumbered<7>,
     provenance: Renumbered<7>,
-    frame_files: RollingBatches,
-    call_files: RollingBatches,
-    scope_files: RollingBatches,
-    meta_files: RollingBatches,
+    frame_files: Rolling<BatchWriter>,
+    call_files: Rolling<BatchWriter>,
+    scope_files: Rolling<BatchWriter>,
+    meta_files: Rolling<BatchWriter>,
     provenance_file: BatchWriter,
     summary: EditSummary,
 }
@@ -113,8 +110,10 @@ impl Target {
         let (info, ntp, cursors) = (like.info.clone(), like.ntp.clone(), &like.cursors);
         let theirs = ntp.annotated_by.as_ref().map(|_| read_json(&like.root().join(layout::INFO))).transpose()?;
         let file_bytes = info.data_files_size_in_mb as usize * MEGABYTE;
-        let rolling = |names, cursor: &BatchCursor, options| {
-            RollingBatches::new(root, names, cursor.schema().clone(), options, file_bytes)
+        let rolling = |folder, table: TableSchema, cursor: &BatchCursor, options: WriteOptions| {
+            let schema = Arc::clone(cursor.schema());
+            let begin = move |path: &Path| BatchWriter::create(path, table.name(), &schema, options.clone());
+            Rolling::new(root, folder, file_bytes, begin)
         };
         let features = numeric_features(&info, cursors.frames.schema());
         let (episodes, columns) = (root.join(layout::EPISODES), cursors.provenance.schema());
@@ -133,11 +132,11 @@ impl Target {
             scopes: Renumbered::new(["episode_index"]),
             meta: Renumbered::new(META_NUMBERS),
             provenance: Renumbered::new(PROVENANCE_NUMBERS),
-            frame_files: rolling((layout::DATA, FRAMES.name()), &cursors.frames, FrameRows::options(ntp.n_slots)),
-            call_files: rolling((layout::CALLS, CALLS.name()), &cursors.calls, CallRows::options()),
-            scope_files: rolling((layout::SCOPES, SCOPES.name()), &cursors.scopes, ScopeRows::options()),
-            meta_files: rolling((layout::META_EPISODES, META_EPISODES.name()), &cursors.meta, MetaRows::options()),
-            provenance_file: BatchWriter::create(&episodes, EPISODES.name(), columns, WriteOptions::default())?,
+            frame_files: rolling(layout::DATA, FRAMES, &cursors.frames, FrameRows::options(ntp.n_slots)),
+            call_files: rolling(layout::CALLS, CALLS, &cursors.calls, CALLS.options()),
+            scope_files: rolling(layout::SCOPES, SCOPES, &cursors.scopes, SCOPES.options()),
+            meta_files: rolling(layout::META_EPISODES, META_EPISODES, &cursors.meta, META_EPISODES.options()),
+            provenance_file: BatchWriter::create(&episodes, EPISODES.name(), columns, EPISODES.options())?,
             info,
             theirs,
             ntp,
@@ -283,17 +282,17 @@ impl Target {
             begin += length;
         }
         self.statistics.keep(&columns, rows.num_rows())?;
-        Ok(self.frame_files.write(&rows)?)
+        Ok(self.frame_files.write(|file| file.write(&rows))?)
     }
 
     fn write_calls(&mut self) -> Result<(), EditError> {
         let rows = self.calls.take().map_err(EditError::rows(layout::CALLS))?;
-        Ok(rows.map_or(Ok(()), |rows| self.call_files.write(&rows))?)
+        Ok(rows.map_or(Ok(()), |rows| self.call_files.write(|file| file.write(&rows)))?)
     }
 
     fn write_scopes(&mut self) -> Result<(), EditError> {
         let rows = self.scopes.take().map_err(EditError::rows(layout::SCOPES))?;
-        Ok(rows.map_or(Ok(()), |rows| self.scope_files.write(&rows))?)
+        Ok(rows.map_or(Ok(()), |rows| self.scope_files.write(|file| file.write(&rows)))?)
     }
 
     /// Writes the rows of episodes, whose statistics need their frames.
@@ -309,7 +308,8 @@ impl Target {
             let statistics = statistics.collect::<Result<Vec<_>, _>>().map_err(failed())?;
             let videos = self.pictures.meta_columns();
             let videos = videos.iter().map(|(name, column)| (name.as_str(), Arc::clone(column)));
-            self.meta_files.write(&replace(&rows, statistics.into_iter().chain(videos)).map_err(failed())?)?;
+            let rows = replace(&rows, statistics.into_iter().chain(videos)).map_err(failed())?;
+            self.meta_files.write(|file| file.write(&rows))?;
         }
         self.pictures.clear_episodes();
         self.statistics.clear();

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::tables::calls::read::{CallBatch, read_calls};
-use crate::dataset::files::cursor::{Batch, Cursor};
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::Info;
 use crate::dataset::files::layout;
-use crate::dataset::schema::{CALLS, FRAMES};
+use crate::dataset::tables::calls::read::{CallBatch, read_calls};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::tables::frames;
 use crate::dataset::tables::texts::subtask::subtask_text;
-use crate::table::{Columns, TableError};
+use crate::table::batch;
 use crate::trace::{ProgramCall, sentence};
 
 /// A label and the frames that have it, half-open.
@@ -71,16 +71,10 @@ impl LabelledEpisode {
     }
 }
 
-struct TimeBatch {
-    time_secs: Vec<f64>,
-    task_index: Vec<i64>,
-}
-
-impl Batch for TimeBatch {
-    const COLUMNS: &'static [&'static str] = &["ntp.time_secs", "task_index"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { time_secs: columns.float64("ntp.time_secs")?, task_index: columns.int64("task_index")? })
+batch! {
+    struct TimeBatch of frames {
+        time_secs,
+        task_index,
     }
 }
 
@@ -94,7 +88,7 @@ pub(super) struct LabelReader {
 impl LabelReader {
     pub(super) fn open(root: &Path) -> Result<(Info, Self), DatasetError> {
         let (info, rows) = EpisodeRows::open(root)?;
-        let (calls, times) = (Cursor::new(root, layout::CALLS, CALLS), Cursor::new(root, layout::DATA, FRAMES));
+        let (calls, times) = (Cursor::new(root, layout::CALLS), Cursor::new(root, layout::DATA));
         Ok((info, Self { rows, calls, times }))
     }
 

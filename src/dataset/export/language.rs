@@ -15,11 +15,10 @@ use arrow::datatypes::{DataType, Field, Fields};
 use arrow::error::ArrowError;
 
 use crate::dataset::edit::EditError;
-use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
 use crate::dataset::export::plain::{copy_files, with_columns, write_frames};
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::FeatureInfo;
 use crate::dataset::files::layout;
 use crate::dataset::schema::META_EPISODES;
@@ -42,7 +41,7 @@ pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> 
     let declared = || FeatureInfo { dtype: Dtype::Language, shape: vec![1], names: None, info: None };
     let features = [PERSISTENT, EVENTS].map(|name| (name.to_owned(), declared()));
     let (info, _) = write_frames(root, to, features.into(), |rows| language.annotate(&rows))?;
-    copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &MetaRows::options(), Ok)?;
+    copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &META_EPISODES.options(), Ok)?;
     Ok(ExportSummary { episodes: info.total_episodes, labels: language.n_entries })
 }
 

@@ -12,12 +12,11 @@ use serde_json::Value;
 use crate::artifact::{IoError, create_dir, read_json, write_json};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
-use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
-use crate::dataset::tables::frames::FrameRows;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
+use crate::dataset::tables::frames::write::FrameRows;
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
 
 /// Rows that are read and written at a time.
@@ -26,7 +25,7 @@ const BATCH_ROWS: usize = 8192;
 /// Writes the dataset.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
     let (info, labels) = write_frames(root, to, Vec::new(), Ok)?;
-    copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &MetaRows::options(), Ok)?;
+    copy_files(root, to, (layout::META_EPISODES, META_EPISODES.name()), &META_EPISODES.options(), Ok)?;
     Ok(ExportSummary { episodes: info.total_episodes, labels })
 }
 

@@ -15,7 +15,6 @@ use serde::{Serialize, Serializer};
 
 use crate::artifact::write_json;
 use crate::dataset::edit::EditError;
-use crate::dataset::tables::episodes::MetaRows;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
 use crate::dataset::export::plain::{copy_files, with_columns, write_frames};
@@ -35,7 +34,7 @@ pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> 
     let mut proportions = [Proportions::default(), Proportions::default()];
     let mut summary = ExportSummary::default();
     let files = (layout::META_EPISODES, META_EPISODES.name());
-    copy_files(root, to, files, &MetaRows::options(), |rows| {
+    copy_files(root, to, files, &META_EPISODES.options(), |rows| {
         let mut columns = [Columns::default(), Columns::default()];
         for episode in reader.by_ref().take(rows.num_rows()) {
             let episode = episode?;

@@ -5,16 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::dataset::DatasetError;
 use crate::dataset::files::layout::FilePlace;
-use crate::table::{Columns, TableError, TableReader, TableSchema};
-
-/// Columns of a batch of rows.
-pub(crate) trait Batch: Sized {
-    /// Names of the columns that are read.
-    const COLUMNS: &'static [&'static str];
-
-    /// Takes the columns.
-    fn take(columns: &mut Columns) -> Result<Self, TableError>;
-}
+use crate::table::{Batch, TableReader};
 
 /// Rows of a batch, one after another.
 pub(crate) struct Rows<'c, B> {
@@ -42,7 +33,6 @@ impl<B: Batch> Rows<'_, B> {
 pub(crate) struct Cursor<B> {
     root: PathBuf,
     folder: &'static str,
-    schema: TableSchema,
     open: Option<OpenFile<B>>,
 }
 
@@ -56,8 +46,8 @@ struct OpenFile<B> {
 }
 
 impl<B: Batch> Cursor<B> {
-    pub(crate) fn new(root: &Path, folder: &'static str, schema: TableSchema) -> Self {
-        Self { root: root.to_owned(), folder, schema, open: None }
+    pub(crate) fn new(root: &Path, folder: &'static str) -> Self {
+        Self { root: root.to_owned(), folder, open: None }
     }
 
     /// Reads the next row, which must be in the file `place`: the one before must then have ended.
@@ -131,7 +121,7 @@ impl<B: Batch> Cursor<B> {
 
     fn open_file(&self, place: FilePlace) -> Result<OpenFile<B>, DatasetError> {
         let path = place.in_dataset(&self.root, self.folder);
-        let reader = TableReader::open_columns(&path, &self.schema, B::COLUMNS)?;
+        let reader = TableReader::open_columns(&path, &B::SCHEMA, B::COLUMNS)?;
         Ok(OpenFile { place, reader, batch: None, at: 0, row: None })
     }
 }

@@ -5,10 +5,7 @@ use std::collections::BTreeMap;
 use serde::ser::SerializeMap as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
 use crate::dataset::files::layout::CHUNK_FILES;
-use crate::dataset::pictures::PictureStatistics;
-use crate::dataset::statistics::FeatureStatistics;
 
 /// The format that `meta/` and `data/` follow.
 pub(crate) const LEROBOT_VERSION: &str = "v3.0";
@@ -50,6 +47,26 @@ pub(crate) struct FeatureInfo {
     /// Of videos alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) info: Option<CameraInfo>,
+}
+
+/// What one value of a feature is, among the types that all readers know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Dtype {
+    Float32,
+    Float64,
+    Int64,
+    Bool,
+    String,
+    /// Encoded pictures in a column.
+    Image,
+    /// Pictures in video files beside the tables.
+    Video,
+    /// Rows of text in a column.
+    Language,
+    /// Of others: numbers of other sizes.
+    #[serde(other)]
+    Other,
 }
 
 /// What `LeRobot` wants to know of a video.
@@ -110,7 +127,7 @@ fn in_order<S: Serializer>(features: &Features, serializer: S) -> Result<S::Ok, 
 }
 
 impl Info {
-    pub(crate) fn new(totals: Totals, slots: &[String], fps: u32, file_megabytes: u32) -> Self {
+    pub(crate) fn new(totals: Totals, features: Features, fps: u32, file_megabytes: u32) -> Self {
         Self {
             codebase_version: LEROBOT_VERSION.to_owned(),
             robot_type: "ntp_gripper".to_owned(),
@@ -124,25 +141,16 @@ impl Info {
             splits: BTreeMap::from([("train".to_owned(), format!("0:{}", totals.episodes))]),
             data_path: "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet".to_owned(),
             video_path: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4".to_owned(),
-            features: Features(FEATURES.iter().map(|feature| declared(feature, slots)).collect()),
+            features,
         }
     }
 }
 
-/// A feature as it is declared where slots have these names.
-pub(crate) fn declared(feature: &Feature, slots: &[String]) -> (String, FeatureInfo) {
-    let shape = vec![feature.width(slots.len())];
-    (
-        feature.name.to_owned(),
-        FeatureInfo { dtype: feature.dtype, shape, names: feature.value_names(slots), info: None },
-    )
-}
-
-/// `meta/stats.json`: statistics by feature, in the order of the columns, then those of pictures.
+/// `meta/stats.json`: statistics of numbers by feature, in the order of the columns, then those of pictures.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Stats(pub(crate) Vec<(String, FeatureStatistics)>, pub(crate) Vec<(String, PictureStatistics)>);
+pub(crate) struct Stats<N, P>(pub(crate) Vec<(String, N)>, pub(crate) Vec<(String, P)>);
 
-impl Serialize for Stats {
+impl<N: Serialize, P: Serialize> Serialize for Stats<N, P> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len() + self.1.len()))?;
         self.0.iter().try_for_each(|(name, statistics)| map.serialize_entry(name, statistics))?;

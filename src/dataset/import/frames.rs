@@ -9,10 +9,10 @@ use arrow::datatypes::{DataType, Field, Int64Type};
 use crate::artifact::sha256_file;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::with_columns;
-use crate::dataset::import::ROOT;
-use crate::dataset::import::rows::AnnotatedRows;
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::import::rows::AnnotatedRows;
 use crate::dataset::schema::FRAMES;
+use crate::dataset::tables::annotated::ROOT;
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
 
 /// Rows that are read at a time: they may hold pictures.

@@ -8,15 +8,16 @@ use arrow::array::{ArrayRef, AsArray as _, BooleanArray, Int64Array, RecordBatch
 use arrow::datatypes::{DataType, Field};
 
 use crate::artifact::sha256_bytes;
-use crate::dataset::tables::calls::{CallRows, ScopeRows};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::{copy_files, with_columns};
-use crate::dataset::import::frames::Annotated;
-use crate::dataset::import::{ImportSummary, ROOT};
 use crate::dataset::files::layout;
-use crate::dataset::files::rolling::RollingTable;
+use crate::dataset::files::rolling::Rolling;
+use crate::dataset::import::ImportSummary;
+use crate::dataset::import::frames::Annotated;
 use crate::dataset::schema::{CALLS, EPISODES, META_EPISODES, SCOPES};
-use crate::table::{Column, TableWriter, Values, WriteOptions};
+use crate::dataset::tables::annotated::{AnnotatedCall, ROOT};
+use crate::dataset::tables::{calls, episodes, scopes};
+use crate::table::{TableRows as _, TableSchema, TableWriter, WriteOptions};
 use crate::trace::Span;
 
 const FILE_BYTES: usize = 100 << 20;
@@ -26,8 +27,8 @@ pub(super) struct AnnotatedRows {
     tasks: Vec<String>,
     subtasks: Vec<String>,
     fps: f64,
-    calls: RollingTable,
-    scopes: RollingTable,
+    calls: Rolling<TableWriter>,
+    scopes: Rolling<TableWriter>,
     episodes: TableWriter,
     /// How many episodes of each task there were.
     trials: BTreeMap<String, i64>,
@@ -37,14 +38,16 @@ pub(super) struct AnnotatedRows {
 
 impl AnnotatedRows {
     pub(super) fn create(root: &Path, tasks: &[String], subtasks: &[String], fps: f64) -> Result<Self, EditError> {
-        let rolling = |folder, schema, options| RollingTable::new(root, folder, schema, options, FILE_BYTES);
+        let rolling = |folder, schema: TableSchema| {
+            Rolling::new(root, folder, FILE_BYTES, move |path| TableWriter::create(path, &schema, schema.options()))
+        };
         Ok(Self {
             tasks: tasks.to_vec(),
             subtasks: subtasks.to_vec(),
             fps,
-            calls: rolling(layout::CALLS, CALLS, CallRows::options()),
-            scopes: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),
-            episodes: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, WriteOptions::default())?,
+            calls: rolling(layout::CALLS, CALLS),
+            scopes: rolling(layout::SCOPES, SCOPES),
+            episodes: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, EPISODES.options())?,
             trials: BTreeMap::new(),
             lengths: Vec::new(),
             summary: ImportSummary { subtasks: subtasks.len() as u64, ..ImportSummary::default() },
@@ -58,114 +61,65 @@ impl AnnotatedRows {
 
     /// Adds an episode: a row group of each table.
     pub(super) fn append(&mut self, episode: &Annotated) -> Result<(), EditError> {
-        let calls = calls(episode);
-        self.append_episode(episode, &calls)?;
-        self.append_calls(episode, &calls)?;
-        let n_scopes = self.append_scopes(episode, &calls)?;
-        self.lengths.push((episode.n_frames, episode.task_index));
+        let (index, n_frames) = (episode.episode_index, episode.n_frames);
+        let (mut calls, mut scopes) = (calls::Rows::default(), scopes::Rows::default());
+        let annotated = annotated_calls(episode, &self.subtasks);
+        calls.append_annotated(&annotated, index, n_frames);
+        scopes.append_annotated(&annotated, index, n_frames);
+        let (n_calls, n_scopes) = (calls.n_rows(), scopes.n_rows());
+        self.append_episode(episode, n_calls as i64)?;
+        self.calls.write(|file| file.write_row_group(&calls.columns()))?;
+        self.scopes.write(|file| file.write_row_group(&scopes.columns()))?;
+        self.lengths.push((n_frames, episode.task_index));
         self.summary.episodes += 1;
-        self.summary.frames += episode.n_frames as u64;
-        self.summary.calls += calls.len() as u64;
-        self.summary.scopes += n_scopes;
+        self.summary.frames += n_frames as u64;
+        self.summary.calls += n_calls as u64;
+        self.summary.scopes += n_scopes as u64;
         Ok(())
     }
 
-    fn append_calls(&mut self, episode: &Annotated, calls: &[Call]) -> Result<(), EditError> {
-        let n_calls = calls.len();
-        let number = |of: &dyn Fn(usize) -> i64| Column::Int64((0..n_calls).map(of).collect());
-        let optional = |of: &dyn Fn(usize) -> i64| Column::OptionalInt64((0..n_calls).map(|at| Some(of(at))).collect());
-        let name = |call: &Call| call.subtask.map_or(ROOT.to_owned(), |subtask| self.subtasks[subtask].clone());
-        let (begin, end) = (|at: usize| i64::from(calls[at].frames.begin), |at: usize| i64::from(calls[at].frames.end));
-        let columns = [
-            ("episode_index", number(&|_| episode.episode_index)),
-            ("call_id", number(&|at| at as i64)),
-            ("caller_id", Column::OptionalInt64((0..n_calls).map(|at| (at > 0).then_some(0)).collect())),
-            ("depth", number(&|at| i64::from(at > 0))),
-            ("step", number(&|at| at.saturating_sub(1) as i64)),
-            ("program", Column::Text(calls.iter().map(name).collect())),
-            ("argument_slot", Column::OptionalInt64(vec![None; n_calls])),
-            ("argument", Column::OptionalText(vec![None; n_calls])),
-            ("input_begin", number(&|_| 0)),
-            ("input_end", number(&|_| episode.n_frames)),
-            ("output_begin", optional(&begin)),
-            ("output_end", optional(&end)),
-            ("frame_begin", number(&begin)),
-            ("frame_end", number(&end)),
-            ("end_of_program", Column::Boolean((0..n_calls).map(|at| at > 0 && at + 1 == n_calls).collect())),
-            ("instruction", Column::OptionalText(vec![None; n_calls])),
-        ];
-        Ok(self.calls.write_row_group(&columns.each_ref().map(|(name, column)| (*name, Values::of(column))))?)
-    }
-
-    fn append_scopes(&mut self, episode: &Annotated, calls: &[Call]) -> Result<u64, EditError> {
-        let window = 0..u32::try_from(episode.n_frames).unwrap_or(u32::MAX);
-        let mut columns: [Vec<i64>; 4] = Default::default();
-        let mut flags: [Vec<bool>; 2] = Default::default();
-        for (call, Call { frames, .. }) in calls.iter().enumerate() {
-            for frame in window.clone() {
-                let numbers = [episode.episode_index, call as i64, i64::from(frame), frames.label(frame) as i64];
-                columns.iter_mut().zip(numbers).for_each(|(column, number)| column.push(number));
-                flags[0].push(frame == frames.begin);
-                flags[1].push(frame == frames.last());
-            }
-        }
-        let [episodes, ids, frames, labels] = &columns;
-        let [starts, ends] = &flags;
-        self.scopes.write_row_group(&[
-            ("episode_index", Values::Int64(episodes)),
-            ("call_id", Values::Int64(ids)),
-            ("specification_frame", Values::Int64(frames)),
-            ("label", Values::Int64(labels)),
-            ("is_start", Values::Boolean(starts)),
-            ("is_end", Values::Boolean(ends)),
-        ])?;
-        Ok(ids.len() as u64)
-    }
-
-    fn append_episode(&mut self, episode: &Annotated, calls: &[Call]) -> Result<(), EditError> {
+    fn append_episode(&mut self, episode: &Annotated, n_calls: i64) -> Result<(), EditError> {
         let text = usize::try_from(episode.task_index).ok().and_then(|task| self.tasks.get(task));
         let Some(text) = text.cloned() else {
             let problem = format!("task_index is {}, but there are {}", episode.task_index, self.tasks.len());
             return Err(EditError::refused("import.rows", Path::new(layout::DATA), problem));
         };
         let trial = self.trials.entry(text.clone()).or_default();
-        let (call_place, scope_place) = (self.calls.place(), self.scopes.place());
-        let number = |number: i64| Column::Int64(vec![number]);
-        let word = |word: &str| Column::Text(vec![word.to_owned()]);
-        let n_frames = episode.n_frames;
-        let columns = [
-            ("episode_index", number(episode.episode_index)),
-            ("seed", word("0")),
-            ("task_id", word(&task_id(&text))),
-            ("task_text", word(&text)),
-            ("family", word("annotated")),
-            ("split", word("seen")),
-            ("trial", number(*trial)),
-            ("counts", Column::Int64List(vec![Vec::new()])),
-            ("actor", word("demonstrator")),
-            ("outcome", word("success")),
-            ("cause", Column::OptionalText(vec![None])),
-            ("success", Column::Boolean(vec![true])),
-            ("recording", word(&episode.data.relative(layout::DATA))),
-            ("recording_sha256", word(&episode.source)),
-            ("recording_index", number(episode.episode_index)),
-            ("n_frames", number(n_frames)),
-            ("n_recorded_frames", number(n_frames)),
-            ("sim_secs", Column::Float64(vec![(n_frames - 1).max(0) as f64 / self.fps])),
-            ("specification", word("episode")),
-            ("specification_frames", number(n_frames)),
-            ("slots", Column::TextList(vec![Vec::new()])),
-            ("n_calls", number(calls.len() as i64)),
-            ("calls/chunk_index", number(i64::from(call_place.chunk))),
-            ("calls/file_index", number(i64::from(call_place.file))),
-            ("calls_from_index", number(self.summary.calls as i64)),
-            ("n_scopes", number(calls.len() as i64 * n_frames)),
-            ("scopes/chunk_index", number(i64::from(scope_place.chunk))),
-            ("scopes/file_index", number(i64::from(scope_place.file))),
-            ("scopes_from_index", number(self.summary.scopes as i64)),
-        ];
+        let (calls, scopes, n_frames) = (self.calls.place(), self.scopes.place(), episode.n_frames);
+        let mut rows = episodes::Rows::default();
+        rows.push(episodes::Row {
+            episode_index: episode.episode_index,
+            seed: "0".into(),
+            task_id: task_id(&text).into(),
+            task_text: text.into(),
+            family: "annotated".into(),
+            split: "seen".into(),
+            trial: *trial,
+            counts: Vec::new(),
+            actor: "demonstrator".into(),
+            outcome: "success".into(),
+            cause: None,
+            success: true,
+            recording: episode.data.relative(layout::DATA).into(),
+            recording_sha256: (*episode.source).into(),
+            recording_index: episode.episode_index,
+            n_frames,
+            n_recorded_frames: n_frames,
+            sim_secs: (n_frames - 1).max(0) as f64 / self.fps,
+            specification: "episode".into(),
+            specification_frames: n_frames,
+            slots: Vec::new(),
+            n_calls,
+            calls_chunk: i64::from(calls.chunk),
+            calls_file: i64::from(calls.file),
+            calls_from: self.summary.calls as i64,
+            n_scopes: n_calls * n_frames,
+            scopes_chunk: i64::from(scopes.chunk),
+            scopes_file: i64::from(scopes.file),
+            scopes_from: self.summary.scopes as i64,
+        });
         *trial += 1;
-        Ok(self.episodes.write_row_group(&columns.each_ref().map(|(name, column)| (*name, Values::of(column))))?)
+        Ok(self.episodes.write_row_group(&rows.columns())?)
     }
 
     pub(super) fn finish(self) -> Result<ImportSummary, EditError> {
@@ -176,22 +130,18 @@ impl AnnotatedRows {
     }
 }
 
-/// A call: the root's, or that of a sub-task.
-struct Call {
-    subtask: Option<usize>,
-    frames: Span,
-}
-
-fn calls(episode: &Annotated) -> Vec<Call> {
+/// The root, and a call for each run of frames.
+fn annotated_calls<'t>(episode: &Annotated, subtasks: &'t [String]) -> Vec<AnnotatedCall<'t>> {
     let span = |begin: i64, end: i64| Span {
         begin: u32::try_from(begin).unwrap_or(u32::MAX),
         end: u32::try_from(end).unwrap_or(u32::MAX),
     };
-    let root = Call { subtask: None, frames: span(0, episode.n_frames) };
-    let runs = episode.runs.iter();
-    std::iter::once(root)
-        .chain(runs.map(|&(subtask, begin, end)| Call { subtask: Some(subtask), frames: span(begin, end) }))
-        .collect()
+    let root = AnnotatedCall { program: ROOT, frames: span(0, episode.n_frames) };
+    let call = |&(subtask, begin, end): &(usize, i64, i64)| AnnotatedCall {
+        program: &subtasks[subtask],
+        frames: span(begin, end),
+    };
+    std::iter::once(root).chain(episode.runs.iter().map(call)).collect()
 }
 
 /// Names a task by its text, so that it has one name in all datasets.

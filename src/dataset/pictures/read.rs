@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::Info;
 use crate::dataset::files::layout;
 use crate::dataset::pictures::PREFIX;

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
-use crate::dataset::tables::view::EpisodeView;
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{CameraInfo, FeatureInfo};
 use crate::dataset::pictures::statistics::EpisodeStatistics;
 use crate::dataset::pictures::{PREFIX, PictureMeasure, PictureStatistics, VideoFiles, video_columns};
+use crate::dataset::tables::view::EpisodeView;
 use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
 use crate::table::{ColumnKind, Value, Values};

@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
-use crate::dataset::files::cursor::{Batch, Cursor};
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::NtpInfo;
 use crate::dataset::files::layout::{self, EPISODES, FilePlace};
-use crate::dataset::schema::{CALLS, FRAMES};
-use crate::table::{Columns, TableError};
+use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::tables::frames;
+use crate::table::{Batch, batch};
 
 /// An episode as `ntp/episodes.parquet` and `ntp/calls/` have it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -69,68 +69,25 @@ pub struct FrameFacts {
     pub stack: Vec<CallFacts>,
 }
 
-/// What runs at each frame: columns that every dataset has.
-struct RunningBatch {
-    index: Vec<i64>,
-    call_id: Vec<i64>,
-    program: Vec<String>,
-}
-
-impl RunningBatch {
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            index: columns.int64("index")?,
-            call_id: columns.int64("ntp.call_id")?,
-            program: columns.text("ntp.program")?,
-        })
-    }
-
-    /// What a row says of a frame; when it was, is left open.
-    fn facts(&self, at: usize, frame_index: i64, calls: &[CallFacts]) -> FrameFacts {
-        FrameFacts {
-            frame_index,
-            index: self.index[at],
-            recording_frame: 0,
-            time_secs: 0.0,
-            is_boundary: false,
-            program: self.program[at].clone(),
-            stack: stack(calls, self.call_id[at]),
-        }
+batch! {
+    /// What is known of frames of our own.
+    struct FrameBatch of frames {
+        index,
+        recording_frame,
+        time_secs,
+        boundary,
+        call_id,
+        program,
     }
 }
 
-struct FrameBatch {
-    running: RunningBatch,
-    recording_frame: Vec<i64>,
-    time_secs: Vec<f64>,
-    boundary: Vec<bool>,
-}
-
-impl Batch for FrameBatch {
-    const COLUMNS: &'static [&'static str] =
-        &["index", "ntp.recording_frame", "ntp.time_secs", "ntp.boundary", "ntp.call_id", "ntp.program"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            running: RunningBatch::take(columns)?,
-            recording_frame: columns.int64("ntp.recording_frame")?,
-            time_secs: columns.float64("ntp.time_secs")?,
-            boundary: columns.boolean("ntp.boundary")?,
-        })
-    }
-}
-
-/// Frames that were annotated elsewhere.
-struct AnnotatedBatch {
-    running: RunningBatch,
-    timestamp: Vec<f32>,
-}
-
-impl Batch for AnnotatedBatch {
-    const COLUMNS: &'static [&'static str] = &["index", "timestamp", "ntp.call_id", "ntp.program"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { running: RunningBatch::take(columns)?, timestamp: columns.float32("timestamp")? })
+batch! {
+    /// Frames that were annotated elsewhere.
+    struct AnnotatedBatch of frames {
+        index,
+        timestamp,
+        call_id,
+        program,
     }
 }
 
@@ -153,7 +110,7 @@ pub fn look_up(
 
 /// The calls of an episode that was found.
 pub(crate) fn read_calls(root: &Path, found: &Found) -> Result<Vec<CallFacts>, DatasetError> {
-    let mut cursor = Cursor::<CallFactsBatch>::new(root, layout::CALLS, CALLS);
+    let mut cursor = Cursor::<CallFactsBatch>::new(root, layout::CALLS);
     let mut n_before = usize::try_from(found.calls_before).unwrap_or(0);
     while n_before > 0 {
         n_before -= cursor.next_rows(found.row.calls, n_before)?.range.len();
@@ -199,19 +156,25 @@ fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Re
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
     if ntp.annotated_by.is_none() {
         return read_frame(root, found, frame, |batch: &FrameBatch, at| FrameFacts {
+            frame_index: frame,
+            index: batch.index[at],
             recording_frame: batch.recording_frame[at],
             time_secs: batch.time_secs[at],
-            is_boundary: batch.boundary[at],
-            ..batch.running.facts(at, frame, calls)
+            is_boundary: batch.boundary.value(at),
+            program: batch.program.row(at).to_owned(),
+            stack: stack(calls, batch.call_id[at]),
         });
     }
-    // Its recording is the data that was imported: of that each frame is there.
     read_frame(root, found, frame, |batch: &AnnotatedBatch, at| FrameFacts {
+        frame_index: frame,
+        index: batch.index[at],
+        // Its recording is the data that was imported: of that each frame is there.
         recording_frame: frame,
         // To the microsecond, which is more than its four bytes tell.
         time_secs: (f64::from(batch.timestamp[at]) * 1e6).round() / 1e6,
         is_boundary: calls.iter().any(|call| call.frames.map(i64::from).contains(&frame)),
-        ..batch.running.facts(at, frame, calls)
+        program: batch.program.row(at).to_owned(),
+        stack: stack(calls, batch.call_id[at]),
     })
 }
 
@@ -222,7 +185,7 @@ fn read_frame<B: Batch>(
     frame: i64,
     facts: impl FnOnce(&B, usize) -> FrameFacts,
 ) -> Result<FrameFacts, DatasetError> {
-    let mut cursor = Cursor::<B>::new(root, layout::DATA, FRAMES);
+    let mut cursor = Cursor::<B>::new(root, layout::DATA);
     let mut n_before = usize::try_from(found.frames_before + frame).unwrap_or(0);
     while n_before > 0 {
         n_before -= cursor.next_rows(found.row.data, n_before)?.range.len();

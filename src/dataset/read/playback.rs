@@ -9,15 +9,15 @@ use arrow::compute::concat_batches;
 use arrow::datatypes::Float32Type;
 
 use crate::artifact::read_json;
-use crate::dataset::statistics::batches::{flags, numeric_features, values};
-use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
-use crate::dataset::read::lookup::{episode_facts, find, read_calls};
 use crate::dataset::pictures::{PREFIX, video_columns};
+use crate::dataset::read::lookup::{episode_facts, find, read_calls};
 use crate::dataset::schema::META_EPISODES;
+use crate::dataset::statistics::batches::{flags, numeric_features, values};
 use crate::dataset::statistics::{NumericFeature, copy_values};
+use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::dataset::{DatasetError, EpisodeFacts, EpisodePictures};
 use crate::table::{BatchReader, ColumnKind, Form, TableError, Value, read_further};
 

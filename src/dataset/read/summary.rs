@@ -6,10 +6,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::artifact::read_json;
-use crate::dataset::tables::episodes::read::EpisodeRows;
-use crate::dataset::files::info::NtpInfo;
 use crate::dataset::DatasetError;
+use crate::dataset::files::info::NtpInfo;
 use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::read::EpisodeRows;
 
 /// What a dataset is made of.
 #[derive(Clone, Debug, PartialEq, Serialize)]

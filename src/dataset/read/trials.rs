@@ -7,16 +7,16 @@
 
 use std::path::Path;
 
-use crate::dataset::tables::calls::read::{read_calls, read_instructions};
 use crate::dataset::files::cursor::Cursor;
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
-use crate::dataset::tables::map::FrameMap;
-use crate::dataset::tables::frames::read::{EpisodeFrames, read_frames};
-use crate::dataset::files::info::Info;
 use crate::dataset::files::layout;
-use crate::dataset::schema::{CALLS, FRAMES};
+use crate::dataset::tables::calls::check::check_tree;
+use crate::dataset::tables::calls::read::{read_calls, read_instructions};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::tables::frames::feature::n_slots;
+use crate::dataset::tables::frames::read::{EpisodeFrames, read_frames};
+use crate::dataset::tables::map::FrameMap;
 use crate::dataset::{DatasetError, DatasetTrials, TrialData};
-use crate::trace::{Cause, Outcome, ProgramCall, Span, check_calls};
+use crate::trace::{ProgramCall, Span};
 
 /// Reads the successful episodes of a dataset of demonstrations.
 ///
@@ -30,9 +30,9 @@ pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
     let (info, mut rows) = EpisodeRows::open(root)?;
     let n_slots = n_slots(root, &info)?;
     let width = crate::trace::Observation::width(n_slots);
-    let mut frame_cursor = Cursor::new(root, layout::DATA, FRAMES);
-    let mut call_cursor = Cursor::new(root, layout::CALLS, CALLS);
-    let mut instruction_cursor = Cursor::new(root, layout::CALLS, CALLS);
+    let mut frame_cursor = Cursor::new(root, layout::DATA);
+    let mut call_cursor = Cursor::new(root, layout::CALLS);
+    let mut instruction_cursor = Cursor::new(root, layout::CALLS);
     let mut trials = Vec::new();
     let mut calls = Vec::new();
     while let Some(row) = rows.next() {
@@ -58,40 +58,6 @@ pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
     call_cursor.finish()?;
     instruction_cursor.finish()?;
     Ok(DatasetTrials { n_slots, trials })
-}
-
-/// Slots of every scene, from the declared width of `observation.state`.
-pub(crate) fn n_slots(root: &Path, info: &Info) -> Result<usize, DatasetError> {
-    let name = "observation.state";
-    let declared = info.features.0.iter().find(|(feature, _)| feature == name).map(|(_, feature)| &feature.shape[..]);
-    match declared {
-        Some(&[width]) if width >= 2 && (width - 2) % 3 == 0 => Ok((width - 2) / 3),
-        _ => Err(DatasetError::Count {
-            path: root.join(layout::INFO),
-            problem: format!("the shape of {name} is {declared:?}, but should be [3 * slots + 2]"),
-        }),
-    }
-}
-
-/// Holds the rules of the program tree.
-pub(crate) fn check_tree(row: &EpisodeRow, n_slots: usize, calls: &[ProgramCall]) -> Result<(), (u32, String)> {
-    let outcome = if row.is_success { Outcome::Success } else { Outcome::Failure(Cause::NeverEnded) };
-    let frames = |n: i64| u32::try_from(n).unwrap_or(0);
-    check_calls(n_slots, frames(row.n_frames), frames(row.specification_frames), calls, outcome).map_err(|error| {
-        match error {
-            crate::trace::TraceError::Call { call, problem } => (call, problem.to_string()),
-            other => (0, other.to_string()),
-        }
-    })?;
-    let is_own = row.specification == "episode";
-    let astray = calls.iter().find(|call| is_own && call.output.is_some_and(|output| output != call.frames));
-    astray.map_or(Ok(()), |call| {
-        let problem = format!(
-            "output is {:?}, but the episode is its own specification and the call ran {:?}",
-            call.output, call.frames
-        );
-        Err((call.id.0, problem))
-    })
 }
 
 fn check_is_demonstration(row: &EpisodeRow) -> Result<(), String> {

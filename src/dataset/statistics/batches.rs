@@ -7,9 +7,10 @@ use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{DataType, Field, Float32Type, Float64Type, Int64Type, Schema};
 use arrow::error::ArrowError;
 
-use crate::dataset::tables::frames::feature::{Dtype, FEATURES, Feature};
+use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::Info;
 use crate::dataset::statistics::NumericFeature;
+use crate::dataset::tables::frames::feature::{FEATURES, Feature};
 use crate::table::Values;
 
 /// The features that have statistics, among the columns of the frames.

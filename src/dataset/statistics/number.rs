@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::table::Values;
 
 /// Zeros lose their sign, so that order and equality agree.

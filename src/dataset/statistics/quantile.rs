@@ -8,7 +8,7 @@
 //!
 //! Memory is 16 kB for each wanted key at most, whatever the number of values.
 
-use crate::dataset::tables::frames::feature::Dtype;
+use crate::dataset::files::info::Dtype;
 use crate::dataset::statistics::number::value_of;
 
 const DIGIT_BITS: u32 = 11;

@@ -2,6 +2,7 @@
 
 use crate::dataset::ConvertError;
 use crate::dataset::config::FrameChoice;
+use crate::dataset::files::layout::FilePlace;
 use crate::dataset::tables::map::FrameMap;
 use crate::trace::{Actor, Boundaries, Episode, Frame, Span};
 
@@ -29,6 +30,26 @@ pub(crate) struct EpisodeView<'e> {
     recorded: &'e [u32],
     /// Whether the episode has the frames of rows alone.
     is_excerpt: bool,
+}
+
+/// Where the rows of an episode are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EpisodePlaces {
+    pub(crate) episode_index: i64,
+    pub(crate) data: FilePlace,
+    pub(crate) first_index: i64,
+    pub(crate) calls: FilePlace,
+    pub(crate) first_call: i64,
+    pub(crate) scopes: FilePlace,
+    pub(crate) first_scope: i64,
+    pub(crate) n_scopes: i64,
+}
+
+/// The recording that an episode comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Source<'s> {
+    pub(crate) file: &'s str,
+    pub(crate) sha256: &'s str,
 }
 
 /// What is used again for each episode.

@@ -6,61 +6,40 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
-use crate::dataset::files::cursor::{Batch, Cursor};
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::finding::Validation;
-use crate::dataset::import::ROOT;
 use crate::dataset::files::layout;
-use crate::dataset::schema::{CALLS, FRAMES, SCOPES};
-use crate::dataset::validate::meta::Texts;
-use crate::dataset::tables::scopes::check::{self, Labelled, ScopeBatch};
-use crate::table::{Columns, TableError};
+use crate::dataset::tables::annotated::ROOT;
+use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::tables::frames;
+use crate::dataset::tables::scopes::check::{self as scopes, Labelled, ScopeBatch};
+use crate::dataset::tables::texts::read::Texts;
+use crate::table::batch;
 use crate::trace::Span;
 
 /// How far `timestamp` may be from `frame_index / fps`: what LeRobot allows.
 const TOLERANCE_SECS: f64 = 1e-4;
 
-struct FrameBatch {
-    /// `index`, `episode_index`, `frame_index`.
-    numbers: [Vec<i64>; 3],
-    timestamp: Vec<f32>,
-    task_index: Vec<i64>,
-    subtask_index: Vec<i64>,
-    call_id: Vec<i64>,
-    program: Vec<String>,
-}
-
-impl Batch for FrameBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "index",
-        "episode_index",
-        "frame_index",
-        "timestamp",
-        "task_index",
-        "subtask_index",
-        "ntp.call_id",
-        "ntp.program",
-    ];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            numbers: [columns.int64("index")?, columns.int64("episode_index")?, columns.int64("frame_index")?],
-            timestamp: columns.float32("timestamp")?,
-            task_index: columns.int64("task_index")?,
-            subtask_index: columns.int64("subtask_index")?,
-            call_id: columns.int64("ntp.call_id")?,
-            program: columns.text("ntp.program")?,
-        })
+batch! {
+    struct FrameBatch of frames {
+        index,
+        episode_index,
+        frame_index,
+        timestamp,
+        task_index,
+        subtask_index,
+        call_id,
+        program,
     }
 }
 
 /// Checks the episodes.
 pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> Result<(), DatasetError> {
     let (info, rows) = EpisodeRows::open(root)?;
-    let mut calls = Cursor::<CallFactsBatch>::new(root, layout::CALLS, CALLS);
-    let mut frames = Cursor::<FrameBatch>::new(root, layout::DATA, FRAMES);
-    let mut labels = Cursor::<ScopeBatch>::new(root, layout::SCOPES, SCOPES);
+    let mut calls = Cursor::<CallFactsBatch>::new(root, layout::CALLS);
+    let mut frames = Cursor::<FrameBatch>::new(root, layout::DATA);
+    let mut labels = Cursor::<ScopeBatch>::new(root, layout::SCOPES);
     for row in rows {
         let row = row?;
         validation.episodes += 1;
@@ -118,7 +97,7 @@ fn check_frames(
         }
         let running = calls.get(next).filter(|call| i64::from(call.frames[0]) <= frame);
         let (batch, at) = cursor.next(row.data)?;
-        let found = batch.numbers.each_ref().map(|column| column[at]);
+        let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
         let expected = [row.first_index + frame, row.episode_index, frame];
         if found != expected {
             let names = "(index, episode_index, frame_index)";
@@ -129,7 +108,7 @@ fn check_frames(
         let text = running.map(|call| call.program.as_str());
         let problems = [
             time_problem(batch.timestamp[at], frame, fps),
-            label_problem((batch.call_id[at], &batch.program[at]), call_id, text),
+            label_problem((batch.call_id[at], batch.program.row(at)), call_id, text),
             texts.task_problem(batch.task_index[at], &row.task_text).map(|problem| ("frames.task", problem)),
             texts.named_subtask_problem(batch.subtask_index[at], text).map(|problem| ("frames.task", problem)),
         ];

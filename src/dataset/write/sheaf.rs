@@ -1,26 +1,26 @@
-//! The tables of a dataset side by side: rows are gathered episode by episode and written by row groups.
+//! The tables of a dataset side by side, as one sheaf: rows are gathered episode by episode and written by row groups.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::artifact::write_json;
-use crate::dataset::tables::calls::{CallRows, ScopeRows};
+use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
-use crate::dataset::tables::view::EpisodeView;
-use crate::dataset::tables::episodes::{EpisodePlaces, MetaRows, ProvenanceRows, Source};
-use crate::dataset::tables::frames::{EpisodeIds, FrameRows};
 use crate::dataset::files::info::{Info, NTP_VERSION, NtpInfo, Stats, Totals};
+use crate::dataset::files::layout;
+use crate::dataset::files::rolling::Rolling;
 use crate::dataset::pictures::PictureFeatures;
-use crate::dataset::files::rolling::RollingTable;
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
 use crate::dataset::statistics::{NumericFeature, Statistics};
+use crate::dataset::tables::frames::feature::declared;
+use crate::dataset::tables::frames::write::{EpisodeIds, FrameRows};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
-use crate::dataset::files::layout;
-use crate::dataset::{ConvertError, ConvertSummary};
+use crate::dataset::tables::view::{EpisodePlaces, EpisodeView, Source};
+use crate::dataset::tables::{calls, episodes, meta_episodes, scopes};
+use crate::dataset::write::writer::ConvertSummary;
 use crate::program::{Program, vocabulary_hash};
 use crate::recording::CameraPictures;
-use crate::table::TextTable;
-use crate::table::{TableWriter, Values, WriteOptions};
+use crate::table::{TableRows as _, TableSchema, TableWriter, TextTable, Values, WriteOptions};
 use crate::task::Family;
 use crate::trace::Episode;
 
@@ -32,10 +32,12 @@ pub(crate) const SCOPE_GROUP_ROWS: usize = 1 << 15;
 pub(crate) const EPISODE_GROUP_ROWS: usize = 1 << 12;
 pub(crate) const MEGABYTE: usize = 1 << 20;
 
-/// The options of a table with further columns.
-fn with(further: Vec<String>, options: WriteOptions) -> WriteOptions {
-    WriteOptions { further, ..options }
+/// A table of a dataset in many files.
+fn rolling(root: &Path, folder: &'static str, schema: TableSchema, options: WriteOptions, file_bytes: usize) -> Files {
+    Rolling::new(root, folder, file_bytes, move |path| TableWriter::create(path, &schema, options.clone()))
 }
+
+type Files = Rolling<TableWriter>;
 
 /// Everything that can begin once the number of slots is known.
 pub(crate) struct Tables {
@@ -44,16 +46,16 @@ pub(crate) struct Tables {
     families: BTreeSet<Family>,
     tasks: TextTable,
     frames: FrameRows,
-    calls: CallRows,
-    scopes: ScopeRows,
-    provenance: ProvenanceRows,
-    meta: MetaRows,
+    calls: calls::Rows,
+    scopes: scopes::Rows,
+    provenance: episodes::Rows,
+    meta: meta_episodes::Rows,
     pictures: PictureFeatures,
     statistics: Statistics,
-    data_files: RollingTable,
-    call_files: RollingTable,
-    scope_files: RollingTable,
-    meta_files: RollingTable,
+    data_files: Files,
+    call_files: Files,
+    scope_files: Files,
+    meta_files: Files,
     provenance_file: TableWriter,
     n_episodes: u64,
     n_frames: u64,
@@ -73,28 +75,26 @@ impl Tables {
         let pictures = PictureFeatures::new(root, config, cameras);
         let n_slots = first.scene.slots.len();
         let file_bytes = config.file_megabytes.get() as usize * MEGABYTE;
-        let rolling = |folder, schema, options| RollingTable::new(root, folder, schema, options, file_bytes);
+        let data_options = WriteOptions { further: pictures.data_schema(), ..FrameRows::options(n_slots) };
+        let meta_options = WriteOptions { further: pictures.meta_schema(), ..META_EPISODES.options() };
+        let rolling = |folder, schema, options| rolling(root, folder, schema, options, file_bytes);
         Ok(Self {
             n_slots,
             slots: first.scene.slots.iter().map(|slot| slot.name.clone()).collect(),
             families: BTreeSet::new(),
             tasks: TextTable::default(),
             frames: FrameRows::new(n_slots),
-            calls: CallRows::new(),
-            scopes: ScopeRows::default(),
-            provenance: ProvenanceRows::default(),
-            meta: MetaRows::default(),
+            calls: calls::Rows::default(),
+            scopes: scopes::Rows::default(),
+            provenance: episodes::Rows::default(),
+            meta: meta_episodes::Rows::default(),
             statistics: Statistics::new(root, NumericFeature::all(n_slots)),
-            data_files: rolling(layout::DATA, FRAMES, with(pictures.data_schema(), FrameRows::options(n_slots))),
-            call_files: rolling(layout::CALLS, CALLS, CallRows::options()),
-            scope_files: rolling(layout::SCOPES, SCOPES, ScopeRows::options()),
-            meta_files: rolling(
-                layout::META_EPISODES,
-                META_EPISODES,
-                with(pictures.meta_schema(), MetaRows::options()),
-            ),
+            data_files: rolling(layout::DATA, FRAMES, data_options),
+            call_files: rolling(layout::CALLS, CALLS, CALLS.options()),
+            scope_files: rolling(layout::SCOPES, SCOPES, SCOPES.options()),
+            meta_files: rolling(layout::META_EPISODES, META_EPISODES, meta_options),
             pictures,
-            provenance_file: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, WriteOptions::default())?,
+            provenance_file: TableWriter::create(&root.join(layout::EPISODES), &EPISODES, EPISODES.options())?,
             n_episodes: 0,
             n_frames: 0,
             n_calls: 0,
@@ -121,16 +121,16 @@ impl Tables {
             first_call: self.n_calls as i64,
             scopes: self.scope_files.place(),
             first_scope: self.n_scopes as i64,
-            n_scopes: self.scopes.append(view, self.n_episodes as i64) as i64,
+            n_scopes: self.scopes.append_episode(view, self.n_episodes as i64) as i64,
         };
         let task_index = i64::from(self.tasks.key(&view.episode.provenance.task_text));
         let (episode_index, first_index) = (places.episode_index, places.first_index);
         let first_row = self.frames.n_rows();
         self.frames.append(view, EpisodeIds { episode_index, first_index, task_index, fps });
         self.statistics.append(&self.frames.columns(), &(first_row..self.frames.n_rows()));
-        self.calls.append(view, episode_index);
-        self.provenance.append(view, source, places);
-        self.meta.append(view, places, self.meta_files.place());
+        self.calls.append_episode(view, episode_index);
+        self.provenance.append_episode(view, source, places);
+        self.meta.append_episode(view, places, self.meta_files.place());
         self.n_episodes += 1;
         self.n_frames += view.n_rows() as u64;
         self.n_calls += view.episode.calls.len() as u64;
@@ -173,29 +173,29 @@ impl Tables {
         let columns = self.frames.columns();
         self.statistics.keep(&columns, self.frames.n_rows())?;
         let columns: Vec<(&str, Values<'_>)> = columns.into_iter().chain(self.pictures.data_columns()).collect();
-        self.data_files.write_row_group(&columns)?;
+        self.data_files.write(|file| file.write_row_group(&columns))?;
         self.frames.clear();
         self.pictures.clear_rows();
         Ok(())
     }
 
     fn write_calls(&mut self) -> Result<(), ConvertError> {
-        self.call_files.write_row_group(&self.calls.columns())?;
+        self.call_files.write(|file| file.write_row_group(&self.calls.columns()))?;
         self.calls.clear();
         Ok(())
     }
 
     fn write_scopes(&mut self) -> Result<(), ConvertError> {
-        self.scope_files.write_row_group(&self.scopes.columns())?;
+        self.scope_files.write(|file| file.write_row_group(&self.scopes.columns()))?;
         self.scopes.clear();
         Ok(())
     }
 
     fn write_episodes(&mut self) -> Result<(), ConvertError> {
-        let mut columns: Vec<(&str, Values<'_>)> = self.meta.columns().into();
+        let mut columns: Vec<(&str, Values<'_>)> = self.meta.columns();
         columns.extend(self.statistics.columns());
         columns.extend(self.pictures.meta_columns());
-        self.meta_files.write_row_group(&columns)?;
+        self.meta_files.write(|file| file.write_row_group(&columns))?;
         self.pictures.clear_episodes();
         self.provenance_file.write_row_group(&self.provenance.columns())?;
         self.meta.clear();
@@ -216,7 +216,7 @@ impl Tables {
         write_subtasks(root, self.frames.subtasks())?;
         let tasks = self.tasks.texts().len() as u64;
         let totals = Totals { episodes: self.n_episodes, frames: self.n_frames, tasks };
-        let mut info = Info::new(totals, &self.slots, config.fps.get(), config.file_megabytes.get());
+        let mut info = Info::new(totals, declared(&self.slots), config.fps.get(), config.file_megabytes.get());
         info.features.0.extend(self.pictures.declared());
         write_json(&root.join(layout::INFO), &info)?;
         write_json(&root.join(layout::NTP_INFO), &self.ntp_info(config, failed_left_out))?;

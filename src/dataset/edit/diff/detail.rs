@@ -15,8 +15,8 @@ use crate::dataset::edit::diff::{ChangedEpisode, EpisodeName};
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::Source;
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 
 /// The columns of an episode's rows, table by table.
 struct Content {

@@ -14,8 +14,8 @@ use crate::dataset::edit::EditError;
 use crate::dataset::edit::pieces::Piece;
 use crate::dataset::edit::samples::Samples;
 use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::read::EpisodeRow;
 
 /// Columns that say only where rows lie.
 const PLACES: [&str; 10] = [

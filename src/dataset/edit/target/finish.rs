@@ -5,10 +5,10 @@ use serde_json::json;
 use crate::artifact::{IoError, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::target::{EditSummary, Target};
-use crate::dataset::tables::frames::feature::FEATURES;
-use crate::dataset::import::vocabulary;
-use crate::dataset::files::info::{FeatureInfo, Features, Info, NtpInfo, Stats, declared};
+use crate::dataset::files::info::{Features, Info, NtpInfo, Stats};
 use crate::dataset::files::layout;
+use crate::dataset::tables::annotated::vocabulary;
+use crate::dataset::tables::frames::feature::{FEATURES, declared};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 impl Target {
@@ -64,8 +64,7 @@ impl Target {
     fn declared_features(&self, slots: &[String]) -> Features {
         let is_ours = |name: &str| FEATURES.iter().any(|feature| feature.name == name);
         let others = self.info.features.0.iter().filter(|(name, _)| !is_ours(name)).cloned();
-        let features: Vec<(String, FeatureInfo)> = FEATURES.iter().map(|feature| declared(feature, slots)).collect();
-        Features(features.into_iter().chain(others).collect())
+        Features(declared(slots).0.into_iter().chain(others).collect())
     }
 
     fn ntp_info(&self, slots: Vec<String>, failed_left_out: u64) -> NtpInfo {

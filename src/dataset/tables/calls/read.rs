@@ -1,62 +1,31 @@
 //! Reads the rows of `ntp/calls/` back into calls.
 
-use arrow::buffer::{BooleanBuffer, ScalarBuffer};
-
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::files::cursor::Cursor;
+use crate::dataset::tables::calls;
 use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::table::{Columns, Form, TableError, TextRows};
+use crate::table::batch;
 use crate::trace::{CallId, Instruction, ProgramCall, Span, Vocabulary};
 
-/// Columns of `ntp/calls/`.
-pub(crate) struct CallBatch {
-    episode_index: ScalarBuffer<i64>,
-    call_id: ScalarBuffer<i64>,
-    caller_id: Vec<Option<i64>>,
-    depth: ScalarBuffer<i64>,
-    step: ScalarBuffer<i64>,
-    program: TextRows,
-    argument_slot: Vec<Option<i64>>,
-    input: [ScalarBuffer<i64>; 2],
-    output: [Vec<Option<i64>>; 2],
-    frames: [ScalarBuffer<i64>; 2],
-    end_of_program: BooleanBuffer,
-}
-
-impl Batch for CallBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "episode_index",
-        "call_id",
-        "caller_id",
-        "depth",
-        "step",
-        "program",
-        "argument_slot",
-        "input_begin",
-        "input_end",
-        "output_begin",
-        "output_end",
-        "frame_begin",
-        "frame_end",
-        "end_of_program",
-    ];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            episode_index: columns.numbers("episode_index")?,
-            call_id: columns.numbers("call_id")?,
-            caller_id: columns.optional_int64("caller_id")?,
-            depth: columns.numbers("depth")?,
-            step: columns.numbers("step")?,
-            program: columns.text_rows("program", Form::Required)?,
-            argument_slot: columns.optional_int64("argument_slot")?,
-            input: [columns.numbers("input_begin")?, columns.numbers("input_end")?],
-            output: [columns.optional_int64("output_begin")?, columns.optional_int64("output_end")?],
-            frames: [columns.numbers("frame_begin")?, columns.numbers("frame_end")?],
-            end_of_program: columns.flags("end_of_program")?,
-        })
+batch! {
+    /// What a program tree is read from.
+    pub(crate) struct CallBatch of calls {
+        episode_index,
+        call_id,
+        caller_id,
+        depth,
+        step,
+        program,
+        argument_slot,
+        input_begin,
+        input_end,
+        output_begin,
+        output_end,
+        frame_begin,
+        frame_end,
+        end_of_program,
     }
 }
 
@@ -71,23 +40,23 @@ impl CallBatch {
             let ends = (small(name, begin)?, small(name, end)?);
             Span::new(ends.0, ends.1).ok_or_else(|| format!("{name} is the empty span {begin}..{end}"))
         };
-        let output = match (self.output[0][at], self.output[1][at]) {
+        let output = match (self.output_begin.get(at), self.output_end.get(at)) {
             (Some(begin), Some(end)) => Some(span("output", begin, end)?),
             (None, None) => None,
             (begin, end) => return Err(format!("output begins at {begin:?} and ends at {end:?}")),
         };
-        let argument = self.argument_slot[at].map(|slot| small("argument_slot", slot)).transpose()?;
+        let argument = self.argument_slot.get(at).map(|slot| small("argument_slot", slot)).transpose()?;
         let program: Program = self.program.row(at).parse().map_err(|unknown| format!("{unknown}"))?;
         Ok(ProgramCall {
             id: CallId(small("call_id", self.call_id[at])?),
-            caller: self.caller_id[at].map(|caller| small("caller_id", caller)).transpose()?.map(CallId),
+            caller: self.caller_id.get(at).map(|caller| small("caller_id", caller)).transpose()?.map(CallId),
             depth: u8::try_from(self.depth[at]).map_err(|_range| format!("depth is {}", self.depth[at]))?,
             step: u16::try_from(self.step[at]).map_err(|_range| format!("step is {}", self.step[at]))?,
             program,
             argument: argument.map(|slot| SlotIndex(u16::try_from(slot).unwrap_or(u16::MAX))),
-            input: span("input", self.input[0][at], self.input[1][at])?,
+            input: span("input", self.input_begin[at], self.input_end[at])?,
             output,
-            frames: span("frames", self.frames[0][at], self.frames[1][at])?,
+            frames: span("frames", self.frame_begin[at], self.frame_end[at])?,
             end_of_program: self.end_of_program.value(at),
             prediction: None,
         })
@@ -111,16 +80,10 @@ pub(crate) fn read_calls(
     Ok(())
 }
 
-/// The instructions in `ntp/calls/`.
-pub(crate) struct InstructionBatch {
-    instruction: TextRows,
-}
-
-impl Batch for InstructionBatch {
-    const COLUMNS: &'static [&'static str] = &["instruction"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self { instruction: columns.text_rows("instruction", Form::Optional)? })
+batch! {
+    /// The instructions.
+    pub(crate) struct InstructionBatch of calls {
+        instruction,
     }
 }
 

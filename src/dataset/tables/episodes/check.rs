@@ -1,16 +1,13 @@
-//! An episode's row on its own, the split over all episodes, and the names of arguments.
+//! An episode's row on its own, and the split over all episodes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor};
-use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout::FilePlace;
-use crate::table::{Columns, Form, TableError, TextRows};
+use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::task::{Family, Split};
-use crate::trace::{Cause, ProgramCall, sentence};
+use crate::trace::Cause;
 
 /// What the episodes so far said of their tasks.
 #[derive(Default)]
@@ -91,46 +88,4 @@ fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
         problems.push(format!("unknown cause {unknown:?}; causes are {}", Cause::ALL.map(Cause::name).join(", ")));
     }
     problems
-}
-
-/// Names and sentences in `ntp/calls/`.
-pub(crate) struct ArgumentBatch {
-    argument: TextRows,
-    instruction: TextRows,
-}
-
-impl Batch for ArgumentBatch {
-    const COLUMNS: &'static [&'static str] = &["argument", "instruction"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        let mut texts = |name: &str| columns.text_rows(name, Form::Optional);
-        Ok(Self { argument: texts("argument")?, instruction: texts("instruction")? })
-    }
-}
-
-/// Holds the names against the episode's slots, and the sentences against the calls.
-pub(crate) fn check_arguments(
-    cursor: &mut Cursor<ArgumentBatch>,
-    row: &EpisodeRow,
-    calls: &[ProgramCall],
-    validation: &mut Validation,
-) -> Result<(), DatasetError> {
-    let name = |slot: usize| row.slots.get(slot).map_or("", String::as_str);
-    for (position, call) in calls.iter().enumerate() {
-        let rows = cursor.next_rows(row.calls, 1)?;
-        let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
-        let at = rows.range.start;
-        let (found, said) = (rows.batch.argument.get(at), rows.batch.instruction.get(at));
-        let meant = sentence(calls, position, name);
-        if said != meant.as_deref() {
-            let message = format!("instruction is {said:?}, but the call is {meant:?}");
-            validation.error("calls.instruction", &rows.path(), place(), message);
-        }
-        let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0))).map(String::as_str);
-        if found != expected {
-            let message = format!("argument is {found:?}, but its slot is named {expected:?}");
-            validation.error("calls.argument", &rows.path(), place(), message);
-        }
-    }
-    Ok(())
 }

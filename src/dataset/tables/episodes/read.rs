@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::Info;
 use crate::dataset::files::layout::{self, FilePlace};
-use crate::dataset::schema::{EPISODES, META_EPISODES};
-use crate::table::{Columns, TableError, TableReader};
+use crate::dataset::tables::{episodes, meta_episodes};
+use crate::table::{Columns, TableError, TableReader, TableRows as _, batch};
 
 /// One episode's row.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,57 +44,28 @@ pub(crate) struct EpisodeRow {
     pub(crate) meta: FilePlace,
 }
 
-struct MetaBatch {
-    episode_index: Vec<i64>,
-    tasks: Vec<Vec<String>>,
-    length: Vec<i64>,
-    chunk: Vec<i64>,
-    file: Vec<i64>,
-    from: Vec<i64>,
-    to: Vec<i64>,
-    own: [Vec<i64>; 2],
-    task_id: Vec<String>,
-    split: Vec<String>,
-    success: Vec<bool>,
-}
-
-impl Batch for MetaBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "episode_index",
-        "tasks",
-        "length",
-        "data/chunk_index",
-        "data/file_index",
-        "dataset_from_index",
-        "dataset_to_index",
-        "meta/episodes/chunk_index",
-        "meta/episodes/file_index",
-        "ntp/task_id",
-        "ntp/split",
-        "ntp/success",
-    ];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            episode_index: columns.int64("episode_index")?,
-            tasks: columns.text_list("tasks")?,
-            length: columns.int64("length")?,
-            chunk: columns.int64("data/chunk_index")?,
-            file: columns.int64("data/file_index")?,
-            from: columns.int64("dataset_from_index")?,
-            to: columns.int64("dataset_to_index")?,
-            own: [columns.int64("meta/episodes/chunk_index")?, columns.int64("meta/episodes/file_index")?],
-            task_id: columns.text("ntp/task_id")?,
-            split: columns.text("ntp/split")?,
-            success: columns.boolean("ntp/success")?,
-        })
+batch! {
+    /// Where the frames of episodes are, and what is said of them twice.
+    struct MetaBatch of meta_episodes {
+        episode_index,
+        tasks,
+        length,
+        data_chunk,
+        data_file,
+        from_index,
+        to_index,
+        own_chunk,
+        own_file,
+        task_id,
+        split,
+        success,
     }
 }
 
 impl MetaBatch {
     /// What is wrong with the columns that repeat what the episode's own row says.
     fn copies_problem(&self, at: usize, row: &EpisodeRow) -> Option<String> {
-        let copies = (self.task_id[at].as_str(), self.split[at].as_str(), self.success[at]);
+        let copies = (self.task_id.row(at), self.split.row(at), self.success.value(at));
         let originals = (row.task_id.as_str(), row.split.as_str(), row.is_success);
         (copies != originals).then(|| {
             let names = "(ntp/task_id, ntp/split, ntp/success)";
@@ -140,16 +111,16 @@ impl EpisodeRows {
     }
 
     fn reader(root: &Path) -> Result<TableReader, DatasetError> {
-        let columns = EPISODES.columns();
+        let columns = episodes::SCHEMA.columns();
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-        Ok(TableReader::open_columns(&root.join(layout::EPISODES), &EPISODES, &names)?)
+        Ok(TableReader::open_columns(&root.join(layout::EPISODES), &episodes::SCHEMA, &names)?)
     }
 
     fn new(root: &Path, reader: TableReader, total: u64) -> Self {
         Self {
             path: root.join(layout::EPISODES),
             reader,
-            meta: Cursor::new(root, layout::META_EPISODES, META_EPISODES),
+            meta: Cursor::new(root, layout::META_EPISODES),
             batch: Vec::new().into_iter(),
             total: total as i64,
             n_read: 0,
@@ -192,10 +163,10 @@ impl EpisodeRows {
     /// Adds where the frames are.
     fn with_meta(&mut self, mut row: EpisodeRow) -> Result<EpisodeRow, DatasetError> {
         let (meta, at) = self.meta.next_in_order()?;
-        row.data = place(meta.chunk[at], meta.file[at]);
-        row.first_index = meta.from[at];
-        row.meta = place(meta.own[0][at], meta.own[1][at]);
-        let found = (meta.episode_index[at], meta.length[at], meta.to[at]);
+        row.data = place(meta.data_chunk[at], meta.data_file[at]);
+        row.first_index = meta.from_index[at];
+        row.meta = place(meta.own_chunk[at], meta.own_file[at]);
+        let found = (meta.episode_index[at], meta.length[at], meta.to_index[at]);
         let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
         row.copies_problem = meta.copies_problem(at, &row);
         let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
@@ -255,52 +226,40 @@ fn place(chunk: i64, file: i64) -> FilePlace {
 }
 
 fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
-    let n_rows = columns.n_rows();
-    let mut text = |name| Ok::<_, TableError>(columns.text(name)?.into_iter());
-    let [mut task_id, mut task_text, mut family] = [text("task_id")?, text("task_text")?, text("family")?];
-    let [mut split, mut actor, mut outcome] = [text("split")?, text("actor")?, text("outcome")?];
-    let [mut specification, mut recording] = [text("specification")?, text("recording")?];
-    let mut recording_sha256 = text("recording_sha256")?;
-    let mut cause = columns.optional_text("cause")?.into_iter();
-    let mut slots = columns.text_list("slots")?.into_iter();
-    let success = columns.boolean("success")?;
-    let mut number = |name| columns.int64(name);
-    let (episode_index, trial) = (number("episode_index")?, number("trial")?);
-    let (specification_frames, n_frames) = (number("specification_frames")?, number("n_frames")?);
-    let recording_index = number("recording_index")?;
-    let (n_calls, n_scopes) = (number("n_calls")?, number("n_scopes")?);
-    let calls = [number("calls/chunk_index")?, number("calls/file_index")?, number("calls_from_index")?];
-    let scopes = [number("scopes/chunk_index")?, number("scopes/file_index")?, number("scopes_from_index")?];
-    let row = |at: usize| {
-        Some(EpisodeRow {
-            episode_index: episode_index[at],
-            task_id: task_id.next()?,
-            task_text: task_text.next()?,
-            family: family.next()?,
-            split: split.next()?,
-            trial: trial[at],
-            actor: actor.next()?,
-            outcome: outcome.next()?,
-            cause: cause.next()?,
-            is_success: success[at],
-            specification: specification.next()?,
-            specification_frames: specification_frames[at],
-            recording: recording.next()?,
-            recording_sha256: recording_sha256.next()?,
-            recording_index: recording_index[at],
-            slots: slots.next()?,
-            n_frames: n_frames[at],
-            n_calls: n_calls[at],
-            n_scopes: n_scopes[at],
-            data: FilePlace::default(),
-            first_index: 0,
-            calls: place(calls[0][at], calls[1][at]),
-            first_call: calls[2][at],
-            scopes: place(scopes[0][at], scopes[1][at]),
-            first_scope: scopes[2][at],
-            copies_problem: None,
-            meta: FilePlace::default(),
-        })
-    };
-    Ok((0..n_rows).filter_map(row).collect())
+    let mut rows = episodes::Rows::take(columns)?;
+    Ok((0..rows.episode_index.len()).map(|at| row(&mut rows, at)).collect())
+}
+
+/// Takes one row out; where its frames are, is not yet known.
+fn row(rows: &mut episodes::Rows, at: usize) -> EpisodeRow {
+    let text = |column: &mut Vec<String>| std::mem::take(&mut column[at]);
+    EpisodeRow {
+        episode_index: rows.episode_index[at],
+        task_id: text(&mut rows.task_id),
+        task_text: text(&mut rows.task_text),
+        family: text(&mut rows.family),
+        split: text(&mut rows.split),
+        trial: rows.trial[at],
+        actor: text(&mut rows.actor),
+        outcome: text(&mut rows.outcome),
+        cause: rows.cause[at].take(),
+        is_success: rows.success[at],
+        specification: text(&mut rows.specification),
+        specification_frames: rows.specification_frames[at],
+        recording: text(&mut rows.recording),
+        recording_sha256: text(&mut rows.recording_sha256),
+        recording_index: rows.recording_index[at],
+        slots: std::mem::take(&mut rows.slots[at]),
+        n_frames: rows.n_frames[at],
+        n_calls: rows.n_calls[at],
+        n_scopes: rows.n_scopes[at],
+        data: FilePlace::default(),
+        first_index: 0,
+        calls: place(rows.calls_chunk[at], rows.calls_file[at]),
+        first_call: rows.calls_from[at],
+        scopes: place(rows.scopes_chunk[at], rows.scopes_file[at]),
+        first_scope: rows.scopes_from[at],
+        copies_problem: None,
+        meta: FilePlace::default(),
+    }
 }

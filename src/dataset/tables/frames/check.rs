@@ -2,69 +2,38 @@
 
 use std::path::Path;
 
-use arrow::buffer::{BooleanBuffer, ScalarBuffer};
-
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor};
-use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames::feature::ACTION_NAMES;
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::finding::Validation;
-use crate::dataset::tables::frames::read::FrameBatch;
 use crate::dataset::files::layout;
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::frames;
+use crate::dataset::tables::frames::feature::ACTION_NAMES;
 use crate::dataset::tables::frames::paths::ProgramPaths;
-use crate::dataset::validate::meta::Texts;
-use crate::table::{Columns, FloatRows, Form, TableError, TextRows};
+use crate::dataset::tables::frames::read::row_problem;
+use crate::dataset::tables::texts::read::Texts;
+use crate::table::{TextTable, batch};
 use crate::trace::{Observation, ProgramCall};
 
-/// Every column of `data/`.
-pub(crate) struct FullFrameBatch {
-    base: FrameBatch,
-    action: FloatRows,
-    timestamp: Vec<f32>,
-    task_index: ScalarBuffer<i64>,
-    subtask_index: ScalarBuffer<i64>,
-    done: BooleanBuffer,
-    success: BooleanBuffer,
-    time_secs: Vec<f64>,
-    recording_frame: ScalarBuffer<i64>,
-    call_id: ScalarBuffer<i64>,
-    program: TextRows,
-}
-
-impl Batch for FullFrameBatch {
-    const COLUMNS: &'static [&'static str] = &[
-        "observation.state",
-        "frame_index",
-        "episode_index",
-        "index",
-        "ntp.boundary",
-        "action",
-        "timestamp",
-        "task_index",
-        "subtask_index",
-        "next.done",
-        "next.success",
-        "ntp.time_secs",
-        "ntp.recording_frame",
-        "ntp.gripper_in_world_m",
-        "ntp.call_id",
-        "ntp.program",
-    ];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            base: FrameBatch::take(columns)?,
-            action: columns.float_rows("action")?,
-            timestamp: columns.float32("timestamp")?,
-            task_index: columns.numbers("task_index")?,
-            subtask_index: columns.numbers("subtask_index")?,
-            done: columns.flags("next.done")?,
-            success: columns.flags("next.success")?,
-            time_secs: columns.float64("ntp.time_secs")?,
-            recording_frame: columns.numbers("ntp.recording_frame")?,
-            call_id: columns.numbers("ntp.call_id")?,
-            program: columns.text_rows("ntp.program", Form::Required)?,
-        })
+batch! {
+    /// Every column.
+    pub(crate) struct FullFrameBatch of frames {
+        state,
+        action,
+        timestamp,
+        frame_index,
+        episode_index,
+        index,
+        task_index,
+        subtask_index,
+        done,
+        success,
+        time_secs,
+        boundary,
+        recording_frame,
+        gripper,
+        call_id,
+        program,
     }
 }
 
@@ -80,7 +49,7 @@ impl Before {
     fn new(batch: &FullFrameBatch, at: usize) -> Self {
         Self {
             action: first(batch.action.row(at)),
-            gripper: first(batch.base.gripper.row(at)),
+            gripper: first(batch.gripper.row(at)),
             time_secs: batch.time_secs[at],
             recording_frame: batch.recording_frame[at],
         }
@@ -92,6 +61,7 @@ pub(crate) struct FrameCheck {
     width: usize,
     fps: u32,
     paths: ProgramPaths,
+    path_texts: TextTable,
     range: StateRange,
 }
 
@@ -116,7 +86,13 @@ impl StateRange {
 impl FrameCheck {
     pub(crate) fn new(n_slots: usize, fps: u32) -> Self {
         let (width, fps) = (Observation::width(n_slots), fps.max(1));
-        Self { width, fps, paths: ProgramPaths::default(), range: StateRange::default() }
+        Self {
+            width,
+            fps,
+            paths: ProgramPaths::default(),
+            path_texts: TextTable::default(),
+            range: StateRange::default(),
+        }
     }
 
     /// Checks the frames of an episode. Labels are checked when its calls are there.
@@ -128,19 +104,20 @@ impl FrameCheck {
         texts: &Texts,
         validation: &mut Validation,
     ) -> Result<(), DatasetError> {
-        self.paths.note(calls.unwrap_or_default());
-        let mut labels = calls.map(|calls| Labels::new(calls, &self.paths));
+        self.paths.note(calls.unwrap_or_default(), &mut self.path_texts);
+        let mut labels = calls.map(|calls| Labels::new(calls, &self.paths, self.path_texts.texts()));
         let mut before: Option<Before> = None;
         let mut frame = 0;
         while frame < row.n_frames {
             let rows = cursor.next_rows(row.data, usize::try_from(row.n_frames - frame).unwrap_or(1))?;
             for at in rows.range.clone() {
                 let batch = rows.batch;
-                if let Some(problem) = batch.base.problem(at, row, frame, self.width) {
+                let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
+                if let Some(problem) = row_problem(found, batch.state.row(at), row, frame, self.width) {
                     return Err(rows.problem(at, problem));
                 }
                 validation.frames += 1;
-                self.range.widen(batch.base.state.row(at));
+                self.range.widen(batch.state.row(at));
                 let mut problems = self.row_problems(batch, at, row, frame, texts);
                 problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
                 problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
@@ -173,18 +150,18 @@ impl FrameCheck {
         if flags != (is_last, is_last && row.is_success) {
             problems.push(("frames.done", format!("(next.done, next.success) are {flags:?}")));
         }
-        if frame == 0 && !batch.base.boundary.value(at) {
+        if frame == 0 && !batch.boundary.value(at) {
             problems.push(("frames.boundary", "the first frame is no boundary".to_owned()));
         }
         problems
             .extend(texts.task_problem(batch.task_index[at], &row.task_text).map(|problem| ("frames.task", problem)));
         problems.extend(texts.subtask_problem(batch.subtask_index[at]).map(|problem| ("frames.task", problem)));
-        let one_hot = &batch.base.state.row(at)[self.width - 2..];
+        let one_hot = &batch.state.row(at)[self.width - 2..];
         if !matches!(one_hot, [1.0, 0.0] | [0.0, 1.0]) {
             problems.push(("frames.state", format!("(open, closed) are {one_hot:?}")));
         }
-        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.base.gripper.row(at).len() != 3 {
-            let lengths = (batch.action.row(at).len(), batch.base.gripper.row(at).len());
+        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.gripper.row(at).len() != 3 {
+            let lengths = (batch.action.row(at).len(), batch.gripper.row(at).len());
             problems.push(("frames.action", format!("action and gripper position are {lengths:?} wide, not (4, 3)")));
         } else if is_last && batch.action.row(at) != [0.0, 0.0, 0.0, one_hot[1]] {
             problems.push(("frames.action", format!("the last action is {:?}", batch.action.row(at))));
@@ -218,9 +195,9 @@ fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&
             format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
         ));
     }
-    let [x, y, z] = first(batch.base.gripper.row(at));
+    let [x, y, z] = first(batch.gripper.row(at));
     let [from_x, from_y, from_z] = before.gripper;
-    let closed = batch.base.state.row(at).last().copied().unwrap_or(f32::NAN);
+    let closed = batch.state.row(at).last().copied().unwrap_or(f32::NAN);
     let expected = [x - from_x, y - from_y, z - from_z, closed];
     (before.action != expected).then(|| {
         ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
@@ -237,6 +214,7 @@ struct Labels<'c> {
     calls: &'c [ProgramCall],
     /// Stacks of running programs, as texts.
     paths: &'c ProgramPaths,
+    texts: &'c [String],
     /// The calls that go on, by position; the root is always there.
     running: Vec<usize>,
     /// Position of the next call that has not begun.
@@ -244,8 +222,8 @@ struct Labels<'c> {
 }
 
 impl<'c> Labels<'c> {
-    fn new(calls: &'c [ProgramCall], paths: &'c ProgramPaths) -> Self {
-        Self { calls, paths, running: Vec::new(), next: 1 }
+    fn new(calls: &'c [ProgramCall], paths: &'c ProgramPaths, texts: &'c [String]) -> Self {
+        Self { calls, paths, texts, running: Vec::new(), next: 1 }
     }
 
     /// The deepest call that goes on from a frame, and its path. Frames are asked for in order.
@@ -259,7 +237,7 @@ impl<'c> Labels<'c> {
             self.next += 1;
         }
         let deepest = self.running.last().copied().unwrap_or(0);
-        (deepest as i64, self.paths.text(deepest))
+        (deepest as i64, self.texts.get(self.paths.key(deepest) as usize).map_or("", String::as_str))
     }
 }
 

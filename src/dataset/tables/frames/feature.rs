@@ -1,31 +1,20 @@
 //! The features of a frame, as `meta/info.json` declares them.
 
-use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::LazyLock;
+
+use crate::dataset::DatasetError;
+use crate::dataset::files::info::{Dtype, FeatureInfo, Features, Info};
+use crate::dataset::files::layout;
+use crate::dataset::tables::frames::{self, column};
+use crate::table::{ColumnSpec, DeclaredColumn as _, Value};
+use crate::trace::Observation;
 
 /// Values of `action`: how far the gripper's reference point moves until the next row, and whether it holds something
 /// then. The last row of an episode moves nowhere. Relative, because so is what the learner sees.
 pub(crate) const ACTION_NAMES: [&str; 4] = ["gripper.dx_m", "gripper.dy_m", "gripper.dz_m", "gripper.closed"];
-const POSITION_NAMES: [&str; 3] = ["x", "y", "z"];
-
-/// What one value of a feature is, among the types that all readers know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Dtype {
-    Float32,
-    Float64,
-    Int64,
-    Bool,
-    String,
-    /// Encoded pictures in a column.
-    Image,
-    /// Pictures in video files beside the tables.
-    Video,
-    /// Rows of text in a column.
-    Language,
-    /// Of others: numbers of other sizes.
-    #[serde(other)]
-    Other,
-}
+/// Values of a position.
+pub(crate) const POSITION_NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// How many values a row has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,36 +32,43 @@ pub(crate) struct Feature {
     pub(crate) width: Width,
 }
 
-const fn scalar(name: &'static str, dtype: Dtype) -> Feature {
-    Feature { name, dtype, width: Width::Scalar }
+/// Every feature, in the order of the columns.
+pub(crate) static FEATURES: LazyLock<Vec<Feature>> =
+    LazyLock::new(|| frames::SCHEMA.specs().map(Feature::of).collect());
+
+/// The features as they are declared where slots have these names.
+pub(crate) fn declared(slots: &[String]) -> Features {
+    let declared = |feature: &Feature| {
+        let (dtype, shape) = (feature.dtype, vec![feature.width(slots.len())]);
+        (feature.name.to_owned(), FeatureInfo { dtype, shape, names: feature.value_names(slots), info: None })
+    };
+    Features(FEATURES.iter().map(declared).collect())
 }
 
-/// Every feature, in the order of the columns.
-pub(crate) const FEATURES: [Feature; 16] = [
-    Feature { name: "observation.state", dtype: Dtype::Float32, width: Width::State },
-    Feature { name: "action", dtype: Dtype::Float32, width: Width::Vector(&ACTION_NAMES) },
-    scalar("timestamp", Dtype::Float32),
-    scalar("frame_index", Dtype::Int64),
-    scalar("episode_index", Dtype::Int64),
-    scalar("index", Dtype::Int64),
-    scalar("task_index", Dtype::Int64),
-    scalar("subtask_index", Dtype::Int64),
-    scalar("next.done", Dtype::Bool),
-    scalar("next.success", Dtype::Bool),
-    scalar("ntp.time_secs", Dtype::Float64),
-    scalar("ntp.boundary", Dtype::Bool),
-    scalar("ntp.recording_frame", Dtype::Int64),
-    Feature { name: "ntp.gripper_in_world_m", dtype: Dtype::Float32, width: Width::Vector(&POSITION_NAMES) },
-    scalar("ntp.call_id", Dtype::Int64),
-    scalar("ntp.program", Dtype::String),
-];
-
 impl Feature {
+    fn of(column: &ColumnSpec) -> Self {
+        let width = match column.name() {
+            column::state::NAME => Width::State,
+            column::action::NAME => Width::Vector(&ACTION_NAMES),
+            column::gripper::NAME => Width::Vector(&POSITION_NAMES),
+            _ => Width::Scalar,
+        };
+        let dtype = match column.kind().value {
+            Value::Int64 => Dtype::Int64,
+            Value::Float32 => Dtype::Float32,
+            Value::Float64 => Dtype::Float64,
+            Value::Boolean => Dtype::Bool,
+            Value::Text => Dtype::String,
+            Value::Picture | Value::Channels => Dtype::Other,
+        };
+        Self { name: column.name(), dtype, width }
+    }
+
     /// How many values a row has in scenes of `n_slots` slots.
     pub(crate) fn width(&self, n_slots: usize) -> usize {
         match self.width {
             Width::Scalar => 1,
-            Width::State => crate::trace::Observation::width(n_slots),
+            Width::State => Observation::width(n_slots),
             Width::Vector(names) => names.len(),
         }
     }
@@ -98,5 +94,18 @@ impl Feature {
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
         !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other)
+    }
+}
+
+/// Slots of every scene, from the declared width of `observation.state`.
+pub(crate) fn n_slots(root: &Path, info: &Info) -> Result<usize, DatasetError> {
+    let name = "observation.state";
+    let declared = info.features.0.iter().find(|(feature, _)| feature == name).map(|(_, feature)| &feature.shape[..]);
+    match declared {
+        Some(&[width]) if width >= 2 && (width - 2) % 3 == 0 => Ok((width - 2) / 3),
+        _ => Err(DatasetError::Count {
+            path: root.join(layout::INFO),
+            problem: format!("the shape of {name} is {declared:?}, but should be [3 * slots + 2]"),
+        }),
     }
 }

@@ -1,54 +1,25 @@
 //! Reads the rows of `data/` back.
 
-use arrow::buffer::{BooleanBuffer, ScalarBuffer};
-
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor};
+use crate::dataset::files::cursor::Cursor;
 use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::table::{Columns, FloatRows, TableError};
+use crate::dataset::tables::frames;
+use crate::table::batch;
 use crate::trace::GripperState;
 
-/// The columns of `data/` that a learner of programs needs.
-pub(crate) struct FrameBatch {
-    pub(crate) state: FloatRows,
-    pub(crate) frame_index: ScalarBuffer<i64>,
-    pub(crate) episode_index: ScalarBuffer<i64>,
-    pub(crate) index: ScalarBuffer<i64>,
-    pub(crate) boundary: BooleanBuffer,
-    pub(crate) gripper: FloatRows,
-}
-
-impl Batch for FrameBatch {
-    const COLUMNS: &'static [&'static str] =
-        &["observation.state", "frame_index", "episode_index", "index", "ntp.boundary", "ntp.gripper_in_world_m"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            state: columns.float_rows("observation.state")?,
-            frame_index: columns.numbers("frame_index")?,
-            episode_index: columns.numbers("episode_index")?,
-            index: columns.numbers("index")?,
-            boundary: columns.flags("ntp.boundary")?,
-            gripper: columns.float_rows("ntp.gripper_in_world_m")?,
-        })
+batch! {
+    /// The columns that a learner of programs needs.
+    pub(crate) struct FrameBatch of frames {
+        state,
+        frame_index,
+        episode_index,
+        index,
+        boundary,
+        gripper,
     }
 }
 
 impl FrameBatch {
-    /// What is wrong with a row that should be frame `frame` of an episode.
-    pub(crate) fn problem(&self, at: usize, row: &EpisodeRow, frame: i64, width: usize) -> Option<String> {
-        let numbers = [
-            ("index", self.index[at], row.first_index + frame),
-            ("episode_index", self.episode_index[at], row.episode_index),
-            ("frame_index", self.frame_index[at], frame),
-            ("the length of observation.state", self.state.row(at).len() as i64, width as i64),
-        ];
-        let wrong = numbers.into_iter().find(|(_, found, expected)| found != expected);
-        let wrong = wrong.map(|(name, found, expected)| format!("{name} is {found}, but should be {expected}"));
-        let finite = self.state.row(at).iter().all(|value| value.is_finite());
-        wrong.or_else(|| (!finite).then(|| "observation.state is not finite".to_owned()))
-    }
-
     /// The gripper in a row, or what is wrong with it.
     fn gripper(&self, at: usize) -> Result<GripperState, String> {
         let found = self.gripper.row(at);
@@ -60,6 +31,28 @@ impl FrameBatch {
             _ => Err(format!("ntp.gripper_in_world_m is {found:?}, but should be three finite numbers")),
         }
     }
+}
+
+/// What is wrong with a row that should be frame `frame` of an episode; `found` are its `index`, `episode_index` and
+/// `frame_index`.
+pub(crate) fn row_problem(
+    found: [i64; 3],
+    state: &[f32],
+    row: &EpisodeRow,
+    frame: i64,
+    width: usize,
+) -> Option<String> {
+    let [index, episode_index, frame_index] = found;
+    let numbers = [
+        ("index", index, row.first_index + frame),
+        ("episode_index", episode_index, row.episode_index),
+        ("frame_index", frame_index, frame),
+        ("the length of observation.state", state.len() as i64, width as i64),
+    ];
+    let wrong = numbers.into_iter().find(|(_, found, expected)| found != expected);
+    let wrong = wrong.map(|(name, found, expected)| format!("{name} is {found}, but should be {expected}"));
+    let finite = state.iter().all(|value| value.is_finite());
+    wrong.or_else(|| (!finite).then(|| "observation.state is not finite".to_owned()))
 }
 
 /// The boundary observations of an episode, one after another, the gripper in each, and which rows are boundaries.
@@ -79,7 +72,8 @@ pub(crate) fn read_frames(
     let mut frames = EpisodeFrames::default();
     for frame in 0..row.n_frames {
         let (batch, at) = cursor.next(row.data)?;
-        if let Some(problem) = batch.problem(at, row, frame, width) {
+        let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
+        if let Some(problem) = row_problem(found, batch.state.row(at), row, frame, width) {
             return Err(cursor.problem(problem));
         }
         let is_boundary = batch.boundary.value(at);

@@ -5,38 +5,25 @@
 
 use std::ops::Range;
 
-use arrow::buffer::{BooleanBuffer, ScalarBuffer};
+use arrow::buffer::BooleanBuffer;
 
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::{Batch, Cursor, Rows};
-use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::files::cursor::{Cursor, Rows};
 use crate::dataset::files::finding::Validation;
-use crate::table::{Columns, TableError};
+use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::scopes;
+use crate::table::batch;
 use crate::trace::Span;
 
-/// Every column of `ntp/scopes/`.
-pub(crate) struct ScopeBatch {
-    episode_index: ScalarBuffer<i64>,
-    call_id: ScalarBuffer<i64>,
-    specification_frame: ScalarBuffer<i64>,
-    label: ScalarBuffer<i64>,
-    is_start: BooleanBuffer,
-    is_end: BooleanBuffer,
-}
-
-impl Batch for ScopeBatch {
-    const COLUMNS: &'static [&'static str] =
-        &["episode_index", "call_id", "specification_frame", "label", "is_start", "is_end"];
-
-    fn take(columns: &mut Columns) -> Result<Self, TableError> {
-        Ok(Self {
-            episode_index: columns.numbers("episode_index")?,
-            call_id: columns.numbers("call_id")?,
-            specification_frame: columns.numbers("specification_frame")?,
-            label: columns.numbers("label")?,
-            is_start: columns.flags("is_start")?,
-            is_end: columns.flags("is_end")?,
-        })
+batch! {
+    /// Every column.
+    pub(crate) struct ScopeBatch of scopes {
+        episode_index,
+        call_id,
+        specification_frame,
+        label,
+        is_start,
+        is_end,
     }
 }
 

@@ -3,33 +3,34 @@
 use std::path::Path;
 
 use crate::dataset::files::layout;
-use crate::dataset::schema::{SUBTASKS, TASKS};
-use crate::table::{TableError, TableSchema, TableWriter, Values, WriteOptions};
+use crate::dataset::tables::texts::{subtasks, tasks};
+use crate::table::{DeclaredColumn as _, TableError, TableRows, TableWriter, WriteOptions};
 
 /// Writes `meta/tasks.parquet`.
 pub(crate) fn write_tasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
-    let metadata = pandas_index("task_index", "__index_level_0__", None);
-    write_texts(root, layout::TASKS, TASKS, ["task_index", "__index_level_0__"], texts, metadata)
+    let mut rows = tasks::Rows::default();
+    numbered(texts).for_each(|(task_index, text)| rows.push(tasks::Row { task_index, text: text.into() }));
+    let pandas = pandas_index(tasks::column::task_index::NAME, tasks::column::text::NAME, None);
+    write_texts(&root.join(layout::TASKS), &rows, pandas)
 }
 
 /// Writes `meta/subtasks.parquet`.
 pub(crate) fn write_subtasks(root: &Path, texts: &[String]) -> Result<(), TableError> {
-    let metadata = pandas_index("subtask_index", "subtask", Some("subtask"));
-    write_texts(root, layout::SUBTASKS, SUBTASKS, ["subtask_index", "subtask"], texts, metadata)
+    let mut rows = subtasks::Rows::default();
+    numbered(texts).for_each(|(subtask_index, text)| rows.push(subtasks::Row { subtask_index, text: text.into() }));
+    let text = subtasks::column::text::NAME;
+    let pandas = pandas_index(subtasks::column::subtask_index::NAME, text, Some(text));
+    write_texts(&root.join(layout::SUBTASKS), &rows, pandas)
 }
 
-fn write_texts(
-    root: &Path,
-    file: &str,
-    schema: TableSchema,
-    [number, text]: [&'static str; 2],
-    texts: &[String],
-    pandas: String,
-) -> Result<(), TableError> {
-    let options = WriteOptions { metadata: vec![("pandas".to_owned(), pandas)], ..WriteOptions::default() };
-    let mut writer = TableWriter::create(&root.join(file), &schema, options)?;
-    let numbers: Vec<i64> = (0..texts.len() as i64).collect();
-    writer.write_row_group(&[(number, Values::Int64(&numbers)), (text, Values::Text(texts))])?;
+fn numbered(texts: &[String]) -> impl Iterator<Item = (i64, &str)> {
+    (0..).zip(texts.iter().map(String::as_str))
+}
+
+fn write_texts<R: TableRows>(path: &Path, rows: &R, pandas: String) -> Result<(), TableError> {
+    let options = WriteOptions { metadata: vec![("pandas".to_owned(), pandas)], ..R::SCHEMA.options() };
+    let mut writer = TableWriter::create(path, &R::SCHEMA, options)?;
+    writer.write_row_group(&rows.columns())?;
     writer.commit()
 }
 
