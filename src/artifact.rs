@@ -11,6 +11,7 @@
 mod atomic;
 mod contract;
 mod lock;
+mod record;
 mod staging;
 mod unfinished;
 

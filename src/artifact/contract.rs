@@ -162,11 +162,11 @@ impl StageDir {
         &self.path
     }
 
-    fn plan_path(&self) -> PathBuf {
+    pub(super) fn plan_path(&self) -> PathBuf {
         self.path.join("plan.json")
     }
 
-    fn receipt_path(&self, shard: u32) -> PathBuf {
+    pub(super) fn receipt_path(&self, shard: u32) -> PathBuf {
         self.path.join(format!("receipts/shard-{shard:05}.json"))
     }
 
@@ -315,8 +315,9 @@ impl StageDir {
     pub fn check_file(&self, expected: &FileEntry, deep: bool) -> Result<(), ContractError> {
         let path = self.path.join(&expected.path);
         let differs = |problem: String| ContractError::FileDiffers { path: path.clone(), problem };
-        let Ok(metadata) = std::fs::metadata(&path) else {
-            return Err(differs("missing".to_owned()));
+        let metadata = match std::fs::metadata(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Err(differs("missing".to_owned())),
+            metadata => metadata.map_err(IoError::system("read", &path))?,
         };
         if metadata.len() != expected.bytes {
             return Err(differs(format!("{} bytes, but its manifest says {}", metadata.len(), expected.bytes)));
@@ -331,7 +332,7 @@ impl StageDir {
     }
 }
 
-fn read_if_there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
+pub(super) fn read_if_there<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
     match read_json(path) {
         Ok(value) => Ok(Some(value)),
         // A recording by itself is no folder, and so has none of the three.

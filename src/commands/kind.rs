@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use anyhow::Context as _;
 use serde::Serialize;
 
 use crate::commands::UsageError;
@@ -109,7 +110,7 @@ pub(super) fn parts_of_run(run: &Path) -> anyhow::Result<Vec<std::path::PathBuf>
 
 /// A folder of a kind, or all below it that are.
 fn collect(folder: &Path, parts: &mut Vec<std::path::PathBuf>) -> anyhow::Result<()> {
-    if !folder.is_dir() {
+    if !is_folder(folder)? {
         return Ok(());
     }
     if Kind::of(folder).is_ok() {
@@ -122,4 +123,13 @@ fn collect(folder: &Path, parts: &mut Vec<std::path::PathBuf>) -> anyhow::Result
     }
     below.sort();
     below.iter().try_for_each(|path| collect(path, parts))
+}
+
+/// Whether a folder is there. A link that leads nowhere is an error: what it led to would be passed over in silence.
+fn is_folder(path: &Path) -> anyhow::Result<bool> {
+    if path.symlink_metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound) {
+        return Ok(false);
+    }
+    let metadata = std::fs::metadata(path).with_context(|| format!("failed to read {}", path.display()))?;
+    Ok(metadata.is_dir())
 }

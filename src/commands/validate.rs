@@ -124,7 +124,10 @@ fn check_manifest(path: &Path, kind: Kind, validation: &mut Validation) {
     let dir = StageDir::new(kind.name(), path);
     let checked = match dir.manifest() {
         Ok(None) => Ok(()),
-        Ok(Some(manifest)) => dir.check_files(&manifest, true).map_err(|error| error.to_string()),
+        Ok(Some(manifest)) => {
+            let checked = dir.check_files(&manifest, true).and_then(|()| dir.check_record(&manifest));
+            checked.map_err(|error| error.to_string())
+        }
         Err(error) => Err(error.to_string()),
     };
     if let Err(message) = checked {

@@ -32,6 +32,7 @@ use crate::trace::ProgramCall;
 /// splits. It reads no recordings.
 pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
+    // One that cannot be read is found below.
     let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
     if info.is_ok_and(|info| info.annotated_by.is_some()) {
         let texts = read_all_texts(root, &mut validation);

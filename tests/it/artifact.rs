@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
+use std::path::Path;
 
 use ntp::artifact::{AtomicFile, ContractError, FileEntry, LockError, Plan, Receipt, RunLock, StageDir, write};
 use serde_json::json;
@@ -69,6 +70,56 @@ fn a_changed_file_is_named_with_what_its_manifest_says() {
     dir.check_files(&manifest, false).unwrap();
     let error = dir.check_files(&manifest, true).unwrap_err().to_string();
     assert!(error.contains("shard-0") && error.contains("sha256"), "{error}");
+}
+
+/// A finished stage of two shards, whose settings have texts with quotes and a number that not every reader keeps.
+fn finished_stage(folder: &Path) -> StageDir {
+    let dir = StageDir::new("generate", folder.join("stage"));
+    let settings = json!({ "words": "a \"b\" \\", "impulse_ns": f64::from(0.03_f32) });
+    let plan = Plan::new("generate", 2, BTreeMap::new(), settings);
+    dir.begin(&plan).unwrap();
+    for shard in [0, 1] {
+        dir.commit_shard(&receipt(&dir, &plan, shard)).unwrap();
+    }
+    dir.commit(&plan, &[]).unwrap();
+    dir
+}
+
+#[test]
+fn no_bit_of_plan_or_receipts_can_change_unseen() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = finished_stage(folder.path());
+    let manifest = dir.finished().unwrap();
+    dir.check_record(&manifest).unwrap();
+    for file in ["plan.json", "receipts/shard-00000.json", "receipts/shard-00001.json"] {
+        let path = dir.path().join(file);
+        let whole = std::fs::read(&path).unwrap();
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut bytes = whole.clone();
+                bytes[at] ^= 1 << bit;
+                std::fs::write(&path, &bytes).unwrap();
+                assert!(dir.check_record(&manifest).is_err(), "{file}: byte {at}, bit {bit}");
+            }
+        }
+        std::fs::write(&path, &whole).unwrap();
+    }
+    dir.check_record(&manifest).unwrap();
+}
+
+#[test]
+fn a_missing_plan_or_receipt_is_named_and_a_published_folder_has_no_receipts() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = finished_stage(folder.path());
+    let manifest = dir.finished().unwrap();
+    std::fs::remove_file(dir.path().join("receipts/shard-00001.json")).unwrap();
+    let error = dir.check_record(&manifest).unwrap_err().to_string();
+    assert!(error.ends_with("receipts/shard-00001.json: missing"), "{error}");
+    std::fs::remove_dir_all(dir.path().join("receipts")).unwrap();
+    dir.check_record(&manifest).unwrap();
+    std::fs::remove_file(dir.path().join("plan.json")).unwrap();
+    let error = dir.check_record(&manifest).unwrap_err().to_string();
+    assert!(error.ends_with("plan.json: missing"), "{error}");
 }
 
 #[test]

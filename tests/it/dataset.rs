@@ -614,6 +614,44 @@ fn spoil(file: &'static str, schema: TableSchema, column: &'static str, row: usi
     }
 }
 
+/// A link to itself: it is there, but nothing can be read behind it.
+#[cfg(unix)]
+fn link_to_itself(path: &Path) {
+    std::os::unix::fs::symlink(path.file_name().unwrap(), path).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_listed_or_read_is_a_finding() {
+    let chunk = |root: &Path| link_to_itself(&root.join("data/chunk-001"));
+    finding(chunk, "file.unreadable", "data/chunk-001", "failed to read");
+    let next = |root: &Path| link_to_itself(&root.join("meta/episodes/chunk-000/file-001.parquet"));
+    finding(next, "file.unreadable", "meta/episodes/chunk-000/file-001.parquet", "failed to read");
+    let card = |root: &Path| std::fs::create_dir(root.join("README.md")).unwrap();
+    finding(card, "file.unreadable", "README.md", "failed to read");
+}
+
+#[test]
+fn a_file_that_no_episode_names_is_found_at_any_depth() {
+    for file in ["data/stray.parquet", "data/chunk-000/deep/stray.parquet"] {
+        let stray = |root: &Path| {
+            std::fs::create_dir_all(root.join(file).parent().unwrap()).unwrap();
+            std::fs::copy(root.join(FIRST_DATA), root.join(file)).unwrap();
+        };
+        finding(stray, "file.unlisted", file, "no episode is in this file");
+    }
+}
+
+#[test]
+fn statistics_that_are_no_statistics_are_told_as_such() {
+    let spoil = |root: &Path| {
+        let path = root.join("meta/stats.json");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replacen("\"q01\"", "\"q02\"", 1)).unwrap();
+    };
+    finding(spoil, "stats.value", "meta/stats.json", "missing field `q01`");
+}
+
 #[test]
 fn every_wrong_value_has_a_finding_of_its_own_code() {
     let frames = |column, row| spoil(FIRST_DATA, schema::FRAMES, column, row);

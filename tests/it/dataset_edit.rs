@@ -404,3 +404,29 @@ fn every_refusal_is_documented_and_no_other() {
     assert!(used.len() > 5);
     assert_eq!(used, documented);
 }
+
+/// Changes a byte of a file, and what `ntp validate` then says of the dataset.
+#[track_caller]
+fn validate_finds_a_changed_byte(root: &Path, file: &str, byte: &str, other: &str) {
+    let path = root.join(file);
+    let whole = std::fs::read_to_string(&path).unwrap();
+    assert!(whole.contains(byte), "{file} has no {byte:?}");
+    std::fs::write(&path, whole.replacen(byte, other, 1)).unwrap();
+    let (code, stdout, stderr) = crate::pipeline::run(&["validate", &root.to_string_lossy()]);
+    assert_eq!(code, 1, "{file}: {stdout}{stderr}");
+    assert!(stdout.contains("MANIFEST") && stdout.contains(file), "{stdout}");
+    std::fs::write(&path, whole).unwrap();
+}
+
+#[test]
+fn validate_finds_a_changed_byte_in_plan_and_receipts() {
+    let folder = two_datasets();
+    let merged = folder.path().join("merged");
+    merge(&sources(folder.path()), &merged).unwrap();
+    let (code, stdout, stderr) = crate::pipeline::run(&["validate", &merged.to_string_lossy()]);
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    validate_finds_a_changed_byte(&merged, "plan.json", "\"shards\": 1", "\"shards\": 2");
+    validate_finds_a_changed_byte(&merged, "plan.json", "\"episodes\": [", "\"episodez\": [");
+    validate_finds_a_changed_byte(&merged, "receipts/shard-00000.json", "\"failed\": 0", "\"failed\": 1");
+    validate_finds_a_changed_byte(&merged, "receipts/shard-00000.json", "\"shard\": 0", "\"shard\": 1");
+}

@@ -37,11 +37,11 @@ pub struct DatasetRepair {
 ///
 /// [`EditError::Refused`] when not even the first episode can be verified.
 pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
-    let files = changed_files(root);
+    let (files, unreadable) = changed_files(root);
     let validation = crate::dataset::validate(root);
     let told = validation.findings.iter().filter(|finding| finding.severity == Severity::Error);
     let told = told.map(|of| format!("{} {}: {} {}", of.code, of.path.display(), of.place, of.message));
-    let mut reasons: Vec<String> = files.values().cloned().chain(told.take(1)).collect();
+    let mut reasons: Vec<String> = unreadable.into_iter().chain(files.values().cloned()).chain(told.take(1)).collect();
     if reasons.is_empty() {
         return Ok(DatasetRepair { reasons, written: None });
     }
@@ -81,13 +81,17 @@ fn nothing(root: &Path, reasons: &[String]) -> EditError {
     EditError::refused("edit.empty", root, problem)
 }
 
-/// Files that are not as the manifest says, with what is wrong; empty where there is no manifest.
-fn changed_files(root: &Path) -> BTreeMap<PathBuf, String> {
+/// Files that are not as the manifest says, with what is wrong; none where there is no manifest. Where it cannot be read,
+/// why not: then rows alone tell what is whole.
+fn changed_files(root: &Path) -> (BTreeMap<PathBuf, String>, Option<String>) {
     let dir = StageDir::new("dataset", root);
-    let manifest = dir.manifest().ok().flatten();
+    let (manifest, unreadable) = match dir.manifest() {
+        Ok(manifest) => (manifest, None),
+        Err(error) => (None, Some(error.to_string())),
+    };
     let files = manifest.iter().flat_map(|manifest| &manifest.files);
     let changed = |file| dir.check_file(file, true).err().map(|error| (root.join(&file.path), error.to_string()));
-    files.filter_map(changed).collect()
+    (files.filter_map(changed).collect(), unreadable)
 }
 
 /// What every episode hangs on must be as it was written. Statistics and task texts are made anew from the rest.

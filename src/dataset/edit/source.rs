@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use arrow::array::AsArray as _;
 use serde::Serialize;
 
-use crate::artifact::{Plan, StageDir, read_json, sha256_bytes, sha256_file};
+use crate::artifact::{IoError, Plan, StageDir, read_json, sha256_bytes, sha256_file};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::cursor::{BatchCursor, TableFiles};
@@ -113,7 +113,8 @@ pub(super) fn version_of(root: &Path) -> Result<String, EditError> {
     let mut lines = String::new();
     for file in files {
         let path = root.join(file);
-        let hash = if path.exists() { sha256_file(&path)? } else { String::new() };
+        let is_there = path.try_exists().map_err(IoError::system("read", &path))?;
+        let hash = if is_there { sha256_file(&path)? } else { String::new() };
         lines.push_str(&format!("{hash}  {file}\n"));
     }
     Ok(sha256_bytes(lines.as_bytes()))

@@ -86,7 +86,7 @@ pub(in crate::dataset) fn copy_files(
 ) -> Result<(), EditError> {
     create_dir(&to.join(folder))?;
     let mut place = FilePlace::default();
-    while place == FilePlace::default() || place.in_dataset(root, folder).exists() {
+    while place == FilePlace::default() || place.is_there(root, folder)? {
         let path = place.in_dataset(root, folder);
         let mut reader = BatchReader::open(&path, BATCH_ROWS)?;
         let mut writer: Option<BatchWriter> = None;

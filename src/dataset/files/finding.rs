@@ -91,6 +91,17 @@ impl Validation {
         self.error(code, path, place, message.clone());
     }
 
+    /// The same, but for a file of which something was found already: it was looked at before.
+    pub(crate) fn failed_once(&mut self, code: &'static str, error: &DatasetError) {
+        let before = self.findings.len();
+        self.failed(code, error);
+        if let Some(last) = self.findings.get(before)
+            && self.findings[..before].iter().any(|finding| finding.path == last.path)
+        {
+            self.findings.truncate(before);
+        }
+    }
+
     fn unreadable(&mut self, error: &TableError) {
         let path = error.path().unwrap_or(Path::new(""));
         let text = error.to_string();

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::artifact::IoError;
+
 /// Totals, features and path templates, as `LeRobot` reads them.
 pub(crate) const INFO: &str = "meta/info.json";
 /// Statistics of each numeric feature over the whole dataset.
@@ -43,6 +45,12 @@ impl FilePlace {
 
     pub(crate) fn in_dataset(self, root: &Path, folder: &str) -> PathBuf {
         root.join(self.relative(folder))
+    }
+
+    /// Whether the file is there.
+    pub(crate) fn is_there(self, root: &Path, folder: &str) -> Result<bool, IoError> {
+        let path = self.in_dataset(root, folder);
+        path.try_exists().map_err(IoError::system("read", &path))
     }
 
     /// The video file of a feature.

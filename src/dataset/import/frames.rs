@@ -43,7 +43,7 @@ pub(super) fn write_frames(
 ) -> Result<(), EditError> {
     let mut walk = Walk { subtasks, rows, source: Arc::default(), open: None, n_episodes: 0, n_frames: 0 };
     let mut place = FilePlace::default();
-    while place == FilePlace::default() || place.in_dataset(root, layout::DATA).exists() {
+    while place == FilePlace::default() || place.is_there(root, layout::DATA)? {
         let path = place.in_dataset(root, layout::DATA);
         walk.source = sha256_file(&path)?.into();
         let mut reader = BatchReader::open(&path, BATCH_ROWS)?;

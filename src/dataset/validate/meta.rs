@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::artifact::read_json;
+use serde::Deserialize as _;
+
+use crate::artifact::{IoError, read_json};
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::info::{Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
@@ -35,8 +37,11 @@ pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
 /// A dataset that was published has a card, and nobody may use what has no licence.
 fn check_card(root: &Path, validation: &mut Validation) {
     let path = root.join(layout::CARD);
-    let Ok(card) = std::fs::read(&path) else { return };
-    let card = String::from_utf8_lossy(&card);
+    let card = match std::fs::read(&path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return,
+        Err(error) => return validation.failed("card.license", &IoError::system("read", &path)(error).into()),
+        Ok(card) => String::from_utf8_lossy(&card).into_owned(),
+    };
     let mut lines = card.lines();
     let is_yaml = lines.next() == Some("---");
     let mut fields = lines.take_while(|line| is_yaml && *line != "---").filter_map(|line| line.split_once(':'));
@@ -109,8 +114,7 @@ fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Op
     let all: Result<BTreeMap<String, serde_json::Value>, _> = read_json(&path);
     let numeric = all.map(|all| {
         let numeric = all.into_iter().filter(|(name, _)| !is_picture(name));
-        let parsed = numeric.filter_map(|(name, value)| Some((name, serde_json::from_value(value).ok()?)));
-        parsed.collect::<BTreeMap<String, FeatureStatistics>>()
+        numeric.collect::<BTreeMap<String, serde_json::Value>>()
     });
     let stats = match numeric {
         Ok(stats) => stats,
@@ -119,16 +123,24 @@ fn check_statistics(root: &Path, info: &Info, validation: &mut Validation) -> Op
             return None;
         }
     };
+    let mut state_range = None;
     for feature in FEATURES.iter().filter(|feature| feature.is_numeric()) {
-        let problem = match stats.get(feature.name) {
+        let problem = match stats.get(feature.name).map(FeatureStatistics::deserialize) {
             None => Some("it has no statistics".to_owned()),
-            Some(statistics) => statistics_problem(statistics, feature, info),
+            Some(Err(error)) => Some(error.to_string()),
+            Some(Ok(statistics)) => {
+                let problem = statistics_problem(&statistics, feature, info);
+                if feature.name == "observation.state" {
+                    state_range = Some((statistics.min, statistics.max));
+                }
+                problem
+            }
         };
         if let Some(problem) = problem {
             validation.error("stats.value", &path, feature.name.to_owned(), problem);
         }
     }
-    stats.get("observation.state").map(|state| (state.min.clone(), state.max.clone()))
+    state_range
 }
 
 /// Checks the statistics of each episode in `meta/episodes/`: as many values as frames, all in order. What is wrong
@@ -142,7 +154,7 @@ fn check_episode_statistics(root: &Path, validation: &mut Validation) -> Result<
     let mut n_episodes = 0;
     loop {
         let path = place.in_dataset(root, layout::META_EPISODES);
-        if n_episodes > 0 && !path.exists() {
+        if n_episodes > 0 && !place.is_there(root, layout::META_EPISODES)? {
             return Ok(());
         }
         for batch in TableReader::open_columns(&path, &META_EPISODES, &names)? {
@@ -211,15 +223,24 @@ fn statistics_problem(statistics: &FeatureStatistics, feature: &Feature, info: &
 /// columns that it does not know of.
 pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &mut Validation) {
     let listed: BTreeSet<PathBuf> = data.iter().map(|place| place.in_dataset(root, layout::DATA)).collect();
-    let mut found: Vec<PathBuf> = files_below(&root.join(layout::DATA)).unwrap_or_default();
-    found.sort_unstable();
+    let mut found = Vec::new();
+    files_below(&root.join(layout::DATA), &mut found, validation);
     for path in found.iter().filter(|path| !listed.contains(*path)) {
         let message = "no episode is in this file, but readers that take all files of the folder would read it";
         validation.error("file.unlisted", path, String::new(), message.to_owned());
     }
-    let images: Vec<String> = EpisodePictures::features(root).unwrap_or_default();
+    let images = match EpisodePictures::features(root) {
+        Ok(images) => images,
+        Err(error) => return validation.failed_once("file.undeclared", &error),
+    };
     for path in &listed {
-        let Ok(reader) = TableReader::open_columns(path, &FRAMES, &["index"]) else { continue };
+        let reader = match TableReader::open_columns(path, &FRAMES, &["index"]) {
+            Ok(reader) => reader,
+            Err(error) => {
+                validation.failed_once("file.unreadable", &error.into());
+                continue;
+            }
+        };
         let known = |name: &&str| {
             FEATURES.iter().any(|feature| feature.name == *name) || images.iter().any(|image| image == name)
         };
@@ -230,13 +251,21 @@ pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &
     }
 }
 
-fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    for chunk in std::fs::read_dir(folder)? {
-        let chunk = chunk?.path();
-        for file in std::fs::read_dir(&chunk).into_iter().flatten() {
-            files.push(file?.path());
+/// Every file below a folder, at any depth, in order of paths. What cannot be listed is a finding.
+fn files_below(folder: &Path, files: &mut Vec<PathBuf>, validation: &mut Validation) {
+    let listed = std::fs::read_dir(folder).and_then(|entries| {
+        let paths = entries.map(|entry| Ok(entry?.path()));
+        paths.collect::<std::io::Result<BTreeSet<PathBuf>>>()
+    });
+    let paths = match listed {
+        Ok(paths) => paths,
+        Err(error) => return validation.failed_once("file.unreadable", &IoError::system("list", folder)(error).into()),
+    };
+    for path in paths {
+        match std::fs::metadata(&path) {
+            Ok(metadata) if metadata.is_dir() => files_below(&path, files, validation),
+            Ok(_) => files.push(path),
+            Err(error) => validation.failed_once("file.unreadable", &IoError::system("read", &path)(error).into()),
         }
     }
-    Ok(files)
 }

@@ -7,8 +7,11 @@ use crate::dataset::files::finding::Validation;
 
 /// Checks the pictures of all cameras.
 pub(super) fn check(root: &Path, validation: &mut Validation) {
-    // A file of features that cannot be read is found where they are checked.
-    for camera in EpisodePictures::cameras(root).unwrap_or_default() {
+    let cameras = match EpisodePictures::cameras(root) {
+        Ok(cameras) => cameras,
+        Err(error) => return validation.failed_once("pictures.place", &error),
+    };
+    for camera in cameras {
         let mut pictures = match EpisodePictures::open(root, &camera) {
             Ok(pictures) => pictures,
             Err(error) => {

@@ -84,7 +84,10 @@ fn read_texts(
 /// Checks that pandas makes the text the index of the table: `LeRobot` takes it from there.
 fn check_pandas_index(root: &Path, file: &str, schema: &table::TableSchema, text: &str, validation: &mut Validation) {
     let path = root.join(file);
-    let Ok(reader) = TableReader::open_columns(&path, schema, &[text]) else { return };
+    let reader = match TableReader::open_columns(&path, schema, &[text]) {
+        Ok(reader) => reader,
+        Err(error) => return validation.failed_once("tasks.index", &error.into()),
+    };
     let pandas = reader.metadata("pandas").and_then(|json| serde_json::from_str::<serde_json::Value>(json).ok());
     if pandas.is_none_or(|pandas| pandas["index_columns"] != serde_json::json!([text])) {
         let message =
