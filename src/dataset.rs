@@ -13,8 +13,9 @@
 //! ntp/scopes/chunk-000/file-000.parquet      one row per call and frame of its caller's window
 //! ```
 //!
-//! Every table's schema is in schemas/parquet. [`read_trials`] reads what a learner needs, [`validate`] checks every
-//! cross-reference, [`summarize`] says what a dataset is, [`play_back`] reads what can be shown of an episode.
+//! Every table is a room of `tables`, where its columns are declared, filled, read and checked. [`read_trials`] reads
+//! what a learner needs, [`validate`] checks every cross-reference, [`summarize`] says what a dataset is, [`play_back`]
+//! reads what can be shown of an episode.
 //!
 //! # Invariants
 //!
@@ -48,4 +49,5 @@ pub use read::trials::read_trials;
 pub use tables::calls::facts::CallFacts;
 pub use validate::validate;
 pub use write::convert::{RecordedEpisode, RecordingEpisodes, convert};
-pub use write::writer::{ConvertSummary, DatasetWriter};
+pub use write::summary::ConvertSummary;
+pub use write::writer::DatasetWriter;

@@ -16,6 +16,7 @@
 //! [`EditError::Refused`] with `import.*` names what the dataset lacks. Memory holds some thousand rows and one
 //! episode's calls.
 
+mod episode;
 mod frames;
 mod rows;
 mod texts;

@@ -2,4 +2,5 @@
 
 pub(crate) mod convert;
 pub(crate) mod sheaf;
+pub(crate) mod summary;
 pub(crate) mod writer;

@@ -103,6 +103,79 @@ fn no_module_uses_a_later_one() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// The rooms of `dataset` in reading order: each may use those before it and none after it.
+const DATASET_ORDER: &[&str] = &[
+    "config",
+    "files",
+    "tables",
+    "schema",
+    "statistics",
+    "pictures",
+    "write",
+    "read",
+    "validate",
+    "edit",
+    "export",
+    "import",
+];
+
+/// What a file of `dataset` uses of it: the paths behind `crate::dataset::`, without names of types.
+fn used_rooms(text: &str) -> Vec<String> {
+    let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    let code = code.join("\n");
+    let mut used = Vec::new();
+    for rest in code.split("crate::dataset::").skip(1) {
+        let is_path = |c: &char| c.is_ascii_lowercase() || *c == '_' || *c == ':';
+        let path: String = rest.chars().take_while(is_path).collect();
+        let group = rest[path.len()..].strip_prefix('{').and_then(|group| Some(group.split_once('}')?.0));
+        let names = group.into_iter().flat_map(|group| group.split(',')).map(str::trim);
+        used.push(path.trim_end_matches(':').to_owned());
+        used.extend(names.map(|name| format!("{path}{}", name.split(' ').next().unwrap_or_default())));
+    }
+    used
+}
+
+#[test]
+fn no_room_of_the_dataset_uses_a_later_one() {
+    let place = |room: &str| DATASET_ORDER.iter().position(|known| *known == room);
+    let mut wrong = Vec::new();
+    for (name, text) in source_files() {
+        let Some(own) = name.strip_prefix("dataset/") else { continue };
+        let own = place(module_of(own)).unwrap_or_else(|| panic!("{name} is missing from the order"));
+        for used in used_rooms(&text) {
+            if place(used.split("::").next().unwrap_or_default()).is_some_and(|used| used > own) {
+                wrong.push(format!("{name} uses {used}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn the_files_of_the_dataset_use_each_other_in_no_circle() {
+    let files: BTreeMap<String, String> = source_files().into_iter().collect();
+    let file_of = |path: &str| {
+        let parts: Vec<&str> = path.split("::").collect();
+        let candidates = (1..=parts.len()).rev().map(|n| format!("dataset/{}.rs", parts[..n].join("/")));
+        candidates.into_iter().find(|file| files.contains_key(file))
+    };
+    let mut left: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for (name, text) in files.iter().filter(|(name, _)| name.starts_with("dataset/")) {
+        let used = used_rooms(text).iter().filter_map(|path| file_of(path)).filter(|used| used != name).collect();
+        left.insert(name, used);
+    }
+    assert!(left.len() > 80);
+    while !left.is_empty() {
+        let leaves: Vec<&str> = left
+            .iter()
+            .filter(|(_, used)| used.iter().all(|of| !left.contains_key(of.as_str())))
+            .map(|(of, _)| *of)
+            .collect();
+        assert!(!leaves.is_empty(), "in a circle, or used by one: {:#?}", left.keys());
+        leaves.iter().for_each(|leaf| drop(left.remove(leaf)));
+    }
+}
+
 #[test]
 fn every_module_has_its_place_in_the_order_and_in_the_map() {
     let map = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md")).unwrap();

@@ -407,14 +407,14 @@ fn every_refusal_is_documented_and_no_other() {
 
 /// Changes a byte of a file, and what `ntp validate` then says of the dataset.
 #[track_caller]
-fn validate_finds_a_changed_byte(root: &Path, file: &str, byte: &str, other: &str) {
+fn validate_finds_a_changed_byte(root: &Path, file: &str, [byte, other]: [&str; 2], named: &str) {
     let path = root.join(file);
     let whole = std::fs::read_to_string(&path).unwrap();
     assert!(whole.contains(byte), "{file} has no {byte:?}");
     std::fs::write(&path, whole.replacen(byte, other, 1)).unwrap();
     let (code, stdout, stderr) = crate::pipeline::run(&["validate", &root.to_string_lossy()]);
     assert_eq!(code, 1, "{file}: {stdout}{stderr}");
-    assert!(stdout.contains("MANIFEST") && stdout.contains(file), "{stdout}");
+    assert!(stdout.contains("MANIFEST") && stdout.contains(named), "{stdout}");
     std::fs::write(&path, whole).unwrap();
 }
 
@@ -425,8 +425,13 @@ fn validate_finds_a_changed_byte_in_plan_and_receipts() {
     merge(&sources(folder.path()), &merged).unwrap();
     let (code, stdout, stderr) = crate::pipeline::run(&["validate", &merged.to_string_lossy()]);
     assert_eq!(code, 0, "{stdout}{stderr}");
-    validate_finds_a_changed_byte(&merged, "plan.json", "\"shards\": 1", "\"shards\": 2");
-    validate_finds_a_changed_byte(&merged, "plan.json", "\"episodes\": [", "\"episodez\": [");
-    validate_finds_a_changed_byte(&merged, "receipts/shard-00000.json", "\"failed\": 0", "\"failed\": 1");
-    validate_finds_a_changed_byte(&merged, "receipts/shard-00000.json", "\"shard\": 0", "\"shard\": 1");
+    validate_finds_a_changed_byte(&merged, "plan.json", ["\"shards\": 1", "\"shards\": 2"], "plan.json: its id");
+    validate_finds_a_changed_byte(&merged, "plan.json", ["\"episodes\": [", "\"episodez\": ["], "plan.json: its id");
+    validate_finds_a_changed_byte(&merged, "receipts/shard-00000.json", ["\"failed\": 0", "\"failed\": 1"], "failures");
+    validate_finds_a_changed_byte(
+        &merged,
+        "receipts/shard-00000.json",
+        ["\"shard\": 0", "\"shard\": 1"],
+        "plan_id and shard",
+    );
 }

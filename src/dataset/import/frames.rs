@@ -10,6 +10,7 @@ use crate::artifact::sha256_file;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::with_columns;
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::import::episode::Annotated;
 use crate::dataset::import::rows::AnnotatedRows;
 use crate::dataset::schema::FRAMES;
 use crate::dataset::tables::annotated::ROOT;
@@ -17,19 +18,6 @@ use crate::table::{BatchReader, BatchWriter, WriteOptions};
 
 /// Rows that are read at a time: they may hold pictures.
 const BATCH_ROWS: usize = 1024;
-
-/// An episode, as its frames tell it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Annotated {
-    pub(super) episode_index: i64,
-    pub(super) task_index: i64,
-    pub(super) n_frames: i64,
-    pub(super) data: FilePlace,
-    /// SHA-256 of the file that it was read from.
-    pub(super) source: Arc<str>,
-    /// Runs of frames of one sub-task: which, and the frames, half-open.
-    pub(super) runs: Vec<(usize, i64, i64)>,
-}
 
 /// The columns of numbers that frames are understood by.
 const NUMBERS: [&str; 5] = ["episode_index", "frame_index", "index", "task_index", "subtask_index"];

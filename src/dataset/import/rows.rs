@@ -13,7 +13,7 @@ use crate::dataset::export::{copy_files, with_columns};
 use crate::dataset::files::layout;
 use crate::dataset::files::rolling::Rolling;
 use crate::dataset::import::ImportSummary;
-use crate::dataset::import::frames::Annotated;
+use crate::dataset::import::episode::Annotated;
 use crate::dataset::schema::{CALLS, EPISODES, META_EPISODES, SCOPES};
 use crate::dataset::tables::annotated::{AnnotatedCall, ROOT};
 use crate::dataset::tables::{calls, episodes, scopes};

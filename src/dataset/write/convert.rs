@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::dataset::ConvertError;
 use crate::dataset::config::ConvertConfig;
-use crate::dataset::write::writer::{ConvertSummary, DatasetWriter};
+use crate::dataset::write::summary::ConvertSummary;
+use crate::dataset::write::writer::DatasetWriter;
 use crate::recording::Pictured;
 use crate::trace::{Boundaries, Episode};
 

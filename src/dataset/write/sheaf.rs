@@ -17,7 +17,7 @@ use crate::dataset::tables::frames::write::{EpisodeIds, FrameRows};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 use crate::dataset::tables::view::{EpisodePlaces, EpisodeView, Source};
 use crate::dataset::tables::{calls, episodes, meta_episodes, scopes};
-use crate::dataset::write::writer::ConvertSummary;
+use crate::dataset::write::summary::ConvertSummary;
 use crate::program::{Program, vocabulary_hash};
 use crate::recording::CameraPictures;
 use crate::table::{TableRows as _, TableSchema, TableWriter, TextTable, Values, WriteOptions};

@@ -2,37 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
 use crate::artifact::{IoError, create_dir};
 use crate::dataset::ConvertError;
 use crate::dataset::config::{ConvertConfig, FailedEpisodes, FrameChoice};
 use crate::dataset::tables::view::Source;
 use crate::dataset::tables::view::{EpisodeView, ViewBuffers};
 use crate::dataset::write::sheaf::Tables;
+use crate::dataset::write::summary::ConvertSummary;
 use crate::recording::{CameraPictures, Pictured};
 use crate::trace::{Boundaries, Episode};
-
-/// What was written.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ConvertSummary {
-    /// Episodes in the dataset.
-    pub episodes: u64,
-    /// Rows of `data/`.
-    pub frames: u64,
-    /// Rows of `ntp/calls/`.
-    pub calls: u64,
-    /// Rows of `ntp/scopes/`.
-    pub scopes: u64,
-    /// Distinct task texts.
-    pub tasks: u64,
-    /// Episodes that failed and were left out.
-    pub failed_left_out: u64,
-    /// Episodes that failed and are in the dataset.
-    pub failed_included: u64,
-    /// Every file, relative to the dataset with `/`, in order of their names.
-    pub files: Vec<String>,
-}
 
 /// A dataset being written.
 pub struct DatasetWriter {

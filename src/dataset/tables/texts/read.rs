@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::dataset::DatasetError;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
-use crate::dataset::schema::{SUBTASKS, TASKS};
+use crate::dataset::tables::texts::{subtasks, tasks};
 use crate::table::{self, TableReader};
 
 /// Texts that frames refer to, and the range that observations should have. Empty where they could not be read.
@@ -48,11 +48,12 @@ pub(crate) fn read_all_texts(root: &Path, validation: &mut Validation) -> Texts 
             validation.failed("meta.row", &error);
         }
     };
-    let tasks = read_texts(root, layout::TASKS, &TASKS, ["task_index", "__index_level_0__"]);
+    let tasks = read_texts(root, layout::TASKS, &tasks::SCHEMA, ["task_index", "__index_level_0__"]);
     note(tasks.map(|tasks| texts.tasks = tasks));
-    let subtasks = read_texts(root, layout::SUBTASKS, &SUBTASKS, ["subtask_index", "subtask"]);
+    let subtasks = read_texts(root, layout::SUBTASKS, &subtasks::SCHEMA, ["subtask_index", "subtask"]);
     note(subtasks.map(|subtasks| texts.subtasks = subtasks));
-    for (file, schema, text) in [(layout::TASKS, &TASKS, "__index_level_0__"), (layout::SUBTASKS, &SUBTASKS, "subtask")]
+    for (file, schema, text) in
+        [(layout::TASKS, &tasks::SCHEMA, "__index_level_0__"), (layout::SUBTASKS, &subtasks::SCHEMA, "subtask")]
     {
         check_pandas_index(root, file, schema, text, validation);
     }
