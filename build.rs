@@ -1,12 +1,21 @@
-//! Compiles `schemas/mcap` into Rust types and, for each message type that recordings name, a descriptor set.
+//! Compiles `schemas/mcap` into Rust types and, for each message type that recordings name, its descriptor sets.
 //!
 //! No `protoc`: `protox` is a compiler of `.proto` in Rust.
 
 use std::error::Error;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use protox::prost::Message as _;
+use protox::prost_reflect::prost_types::{EnumValueDescriptorProto, FileDescriptorSet};
+
 const ROOT: &str = "schemas/mcap";
+
+/// As many programs as the first recordings knew. The enum of programs only ever grows at its end, and a recording
+/// declares no more of them than its family needs: see `program::KnownPrograms`.
+const FIRST_PROGRAMS: i32 = 12;
+const PROGRAMS: &str = "Program";
 
 /// Message types that a channel of a recording may carry, and the files that declare them.
 const MESSAGES: [(&str, &str); 14] = [
@@ -31,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
     let out = PathBuf::from(std::env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?);
     generate_types()?;
-    write_descriptors(&out.join("descriptors"))
+    write_descriptors(&out)
 }
 
 fn generate_types() -> Result<(), Box<dyn Error>> {
@@ -46,13 +55,30 @@ fn generate_types() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// One self-contained descriptor set a message type, as MCAP wants it: the file and all that it imports.
-fn write_descriptors(folder: &Path) -> Result<(), Box<dyn Error>> {
-    fs::create_dir_all(folder)?;
+/// The self-contained descriptor set of each message type, as MCAP wants it: the file and all that it imports. One for
+/// each number of programs that a recording may know; `descriptors.rs` is the table of them.
+fn write_descriptors(out: &Path) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(out.join("descriptors"))?;
+    let mut table = String::from("&[");
     for (message, file) in MESSAGES {
         let mut compiler = protox::Compiler::new([ROOT])?;
         compiler.include_imports(true).include_source_info(false).open_file(file)?;
-        fs::write(folder.join(format!("{message}.binpb")), compiler.encode_file_descriptor_set())?;
+        let mut all = compiler.file_descriptor_set();
+        let n_programs = programs(&mut all).map(|values| values.len() as i32 - 1).max();
+        for n in FIRST_PROGRAMS..=n_programs.unwrap_or(FIRST_PROGRAMS) {
+            let mut known = all.clone();
+            programs(&mut known).for_each(|values| values.retain(|value| value.number() <= n));
+            let name = format!("descriptors/{message}.{n}.binpb");
+            fs::write(out.join(&name), known.encode_to_vec())?;
+            write!(table, "({message:?}, {n}, include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}\"))),")?;
+        }
     }
-    Ok(())
+    table.push(']');
+    Ok(fs::write(out.join("descriptors.rs"), table)?)
+}
+
+/// The values of the enum of programs in each file that declares it: `IDLE`, then one a program.
+fn programs(set: &mut FileDescriptorSet) -> impl Iterator<Item = &mut Vec<EnumValueDescriptorProto>> {
+    let enums = set.file.iter_mut().filter(|file| file.package() == "ntp.v1").flat_map(|file| &mut file.enum_type);
+    enums.filter(|declared| declared.name() == PROGRAMS).map(|declared| &mut declared.value)
 }

@@ -141,9 +141,74 @@ impl FromStr for Program {
     }
 }
 
-/// Hash of names and order: a model runs only on the vocabulary it was trained with.
-pub fn vocabulary_hash() -> String {
-    let names = Program::ALL.map(Program::name).join("\n");
-    let digest = Sha256::digest(names.as_bytes());
-    digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+/// The programs that a file or a model knows: the first so many of [`Program::ALL`].
+///
+/// # Invariants
+///
+/// [`Program::ALL`] only ever grows at its end. So what was written before a program was there is read as ever, and a
+/// family whose programs were there is written as ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct KnownPrograms {
+    n: usize,
+}
+
+impl KnownPrograms {
+    /// Those of the first files.
+    pub const FIRST: Self = Self { n: 12 };
+    /// All that there are.
+    pub const ALL: Self = Self { n: Program::ALL.len() };
+
+    /// The fewest that hold a program.
+    pub fn up_to(program: Program) -> Self {
+        Self { n: program.index() + 1 }.max(Self::FIRST)
+    }
+
+    /// Those of a hash that a file tells; nothing for programs of which this version knows nothing.
+    pub fn of_hash(hash: &str) -> Option<Self> {
+        (Self::FIRST.n..=Self::ALL.n).map(|n| Self { n }).find(|known| known.hash() == hash)
+    }
+
+    /// The programs, in the order of the program memory.
+    pub fn programs(self) -> &'static [Program] {
+        const ALL: &[Program] = &Program::ALL;
+        &ALL[..self.n]
+    }
+
+    /// Their names, in order.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        self.programs().iter().map(|program| program.name())
+    }
+
+    /// How many there are.
+    pub fn count(self) -> usize {
+        self.n
+    }
+
+    /// Hash of names and order.
+    pub fn hash(self) -> String {
+        let names = self.names().collect::<Vec<_>>().join("\n");
+        let digest = Sha256::digest(names.as_bytes());
+        digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Files and models tell this hash: the programs before it must stay as they are, in this order.
+    #[test]
+    fn programs_are_only_added_at_the_end() {
+        assert_eq!(KnownPrograms::FIRST.hash(), "bdf60fa5c571ee0a");
+    }
+
+    #[test]
+    fn what_knows_fewer_programs_is_known_by_its_hash() {
+        for known in [KnownPrograms::FIRST, KnownPrograms::ALL] {
+            assert_eq!(KnownPrograms::of_hash(&known.hash()), Some(known));
+        }
+        assert_eq!(KnownPrograms::of_hash("0123456789abcdef"), None);
+        assert_eq!(KnownPrograms::up_to(Program::BlockStacking), KnownPrograms::FIRST);
+        assert_eq!(KnownPrograms::up_to(Program::ALL[Program::ALL.len() - 1]), KnownPrograms::ALL);
+    }
 }

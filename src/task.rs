@@ -26,7 +26,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::program::Program;
+use crate::program::{KnownPrograms, Program};
 use crate::scene::SlotIndex;
 
 /// A kind of task: its objects, its programs, its goal conditions.
@@ -70,6 +70,11 @@ impl Family {
             Self::ObjectSorting => Program::ObjectSorting,
             Self::TableCleanup => Program::TableCleanup,
         }
+    }
+
+    /// The programs that its recordings, datasets and models know.
+    pub fn programs(self) -> KnownPrograms {
+        KnownPrograms::up_to(self.root_program())
     }
 
     /// How many slots its scenes have.

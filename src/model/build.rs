@@ -43,30 +43,20 @@ pub trait NetworkUse {
 
 /// Makes a fresh network as configured and hands it on; the same seed gives the same parameters.
 pub fn with_network<U: NetworkUse>(config: &ModelConfig, seed: Seed, device: &Device, wanted: U) -> U::Output {
+    let init = &mut Init::new(seed, device).knowing(config.programs());
+    let n_slots = config.n_slots;
     match &config.network {
-        NetworkConfig::ObjectCentric(widths) => {
-            of_encoder::<ObjectCentric, BySlot, U>(config, widths, seed, device, wanted)
+        NetworkConfig::ObjectCentric(widths) => of_encoder::<ObjectCentric, BySlot, U>(config, widths, init, wanted),
+        NetworkConfig::Flattened(widths) => of_encoder::<Flattened, ByVector, U>(config, widths, init, wanted),
+        NetworkConfig::Instructed(widths) => wanted.run(Ntp::<Instructed>::drawn(widths, n_slots, init)),
+        NetworkConfig::ColourSlots(widths) => wanted.run(Ntp::<Sighted<ColourSlots>>::drawn(widths, n_slots, init)),
+        NetworkConfig::Convolved(widths) => wanted.run(Ntp::<FlatEncoder<Convolved>>::drawn(widths, n_slots, init)),
+        NetworkConfig::Keypoints(widths) => wanted.run(Ntp::<Sighted<Keypoints>>::drawn(widths, n_slots, init)),
+        NetworkConfig::Detected(detector, widths) => {
+            wanted.run_detecting(detecting::<PointDetector, ObjectCentric>(detector, widths, n_slots, init))
         }
-        NetworkConfig::Flattened(widths) => of_encoder::<Flattened, ByVector, U>(config, widths, seed, device, wanted),
-        NetworkConfig::Instructed(widths) => wanted.run(Ntp::<Instructed>::new(widths, config.n_slots, seed, device)),
-        NetworkConfig::ColourSlots(widths) => {
-            wanted.run(Ntp::<Sighted<ColourSlots>>::new(widths, config.n_slots, seed, device))
-        }
-        NetworkConfig::Convolved(widths) => {
-            wanted.run(Ntp::<FlatEncoder<Convolved>>::new(widths, config.n_slots, seed, device))
-        }
-        NetworkConfig::Keypoints(widths) => {
-            wanted.run(Ntp::<Sighted<Keypoints>>::new(widths, config.n_slots, seed, device))
-        }
-        NetworkConfig::Detected(detector, widths) => wanted.run_detecting(detecting::<PointDetector, ObjectCentric>(
-            detector,
-            widths,
-            config.n_slots,
-            seed,
-            device,
-        )),
         NetworkConfig::DetectedFlattened(detector, widths) => {
-            wanted.run_detecting(detecting::<VggDetector, Flattened>(detector, widths, config.n_slots, seed, device))
+            wanted.run_detecting(detecting::<VggDetector, Flattened>(detector, widths, n_slots, init))
         }
     }
 }
@@ -76,10 +66,8 @@ fn detecting<D: Detector, E: Encoder<Percepts = ()>>(
     detector: &D::Config,
     widths: &E::Config,
     n_slots: usize,
-    seed: Seed,
-    device: &Device,
+    init: &mut Init,
 ) -> Detecting<D, Ntp<E>> {
-    let init = &mut Init::new(seed, device);
     let detector = D::new(detector, n_slots, init);
     Detecting::new(detector, Ntp::<E>::drawn(widths, n_slots, init), n_slots)
 }
@@ -87,17 +75,16 @@ fn detecting<D: Detector, E: Encoder<Percepts = ()>>(
 fn of_encoder<E: Encoder, P: CallEncoder<Config = E::Config>, U: NetworkUse>(
     config: &ModelConfig,
     widths: &E::Config,
-    seed: Seed,
-    device: &Device,
+    init: &mut Init,
     wanted: U,
 ) -> U::Output {
     let n_slots = config.n_slots;
     match config.variant.architecture() {
-        Architecture::Ntp => wanted.run(Ntp::<E>::new(widths, n_slots, seed, device)),
-        Architecture::NtpGru => wanted.run(NtpGru::<E>::new(widths, n_slots, seed, device)),
-        Architecture::NtpNoScope => wanted.run(NtpNoScope::<E>::new(widths, n_slots, seed, device)),
-        Architecture::Flat => wanted.run(Flat::<E>::new(widths, n_slots, seed, device)),
-        Architecture::Npi => wanted.run(Npi::<P>::new(widths, n_slots, config.tasks.len(), seed, device)),
-        Architecture::FlatGru => wanted.run(FlatGru::<E>::new(widths, n_slots, seed, device)),
+        Architecture::Ntp => wanted.run(Ntp::<E>::drawn(widths, n_slots, init)),
+        Architecture::NtpGru => wanted.run(NtpGru::<E>::drawn(widths, n_slots, init)),
+        Architecture::NtpNoScope => wanted.run(NtpNoScope::<E>::drawn(widths, n_slots, init)),
+        Architecture::Flat => wanted.run(Flat::<E>::drawn(widths, n_slots, init)),
+        Architecture::Npi => wanted.run(Npi::<P>::drawn(widths, n_slots, config.tasks.len(), init)),
+        Architecture::FlatGru => wanted.run(FlatGru::<E>::drawn(widths, n_slots, init)),
     }
 }

@@ -11,7 +11,7 @@ use crate::model::object_centric::ObjectCentricConfig;
 use crate::model::sighted::SightedConfig;
 use crate::model::variant::{EncoderKind, Variant};
 use crate::model::vectors::ConvolvedConfig;
-use crate::program::vocabulary_hash;
+use crate::program::KnownPrograms;
 use crate::task::Family;
 use crate::trace::SpecificationForm;
 
@@ -162,7 +162,7 @@ pub struct ModelConfig {
     pub family: Family,
     /// Slots of the scenes that it was trained on.
     pub n_slots: usize,
-    /// Hash of the program vocabulary.
+    /// Hash of the programs that it knows: those of its family.
     pub vocabulary: String,
     /// The tasks that it knows by name, where it knows any: those of [`Variant::Npi`], in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -177,7 +177,12 @@ impl ModelConfig {
     /// Version of `config.json`.
     pub const VERSION: u32 = 2;
 
-    /// A model of a variant's default widths and the current vocabulary, which knows no task by name.
+    /// The programs that it knows: a row of its memory each.
+    pub fn programs(&self) -> KnownPrograms {
+        KnownPrograms::of_hash(&self.vocabulary).unwrap_or(KnownPrograms::FIRST)
+    }
+
+    /// A model of a variant's default widths and its family's programs, which knows no task by name.
     pub fn new(
         variant: Variant,
         specification: SpecificationForm,
@@ -190,7 +195,7 @@ impl ModelConfig {
             variant,
             family,
             n_slots,
-            vocabulary: vocabulary_hash(),
+            vocabulary: family.programs().hash(),
             tasks: Vec::new(),
             network: NetworkConfig::of(variant, specification),
             training,

@@ -12,11 +12,13 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::model::convolution::Convolution;
 use crate::model::linear::Linear;
+use crate::program::KnownPrograms;
 use crate::seed::Seed;
 
 /// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
 /// another process.
 pub struct Init {
+    known: KnownPrograms,
     rng: ChaCha8Rng,
     next_id: u64,
     device: Device,
@@ -24,7 +26,18 @@ pub struct Init {
 
 impl Init {
     pub(crate) fn new(seed: Seed, device: &Device) -> Self {
-        Self { rng: seed.derive("parameters", &[]).rng(), next_id: 1, device: device.clone() }
+        let rng = seed.derive("parameters", &[]).rng();
+        Self { known: KnownPrograms::FIRST, rng, next_id: 1, device: device.clone() }
+    }
+
+    /// For a network that knows these programs.
+    pub(crate) fn knowing(self, known: KnownPrograms) -> Self {
+        Self { known, ..self }
+    }
+
+    /// The programs that the network shall know.
+    pub(crate) fn known(&self) -> KnownPrograms {
+        self.known
     }
 
     /// Uniform in `-bound..bound`.

@@ -24,7 +24,7 @@ pub struct ProgramMemory {
 
 impl ProgramMemory {
     pub(crate) fn new(init: &mut Init, width: usize) -> Self {
-        let n_programs = Program::ALL.len();
+        let n_programs = init.known().count();
         Self { programs: init.parameter([n_programs, width], 0.5), keys: init.parameter([n_programs, width], 0.5) }
     }
 

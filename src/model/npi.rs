@@ -86,7 +86,11 @@ impl<E: CallEncoder> Npi<E> {
     /// A fresh network for scenes of `n_slots` slots that knows `n_tasks` tasks by name; the same seed gives the same
     /// parameters.
     pub fn new(config: &E::Config, n_slots: usize, n_tasks: usize, seed: Seed, device: &Device) -> Self {
-        let init = &mut Init::new(seed, device);
+        Self::drawn(config, n_slots, n_tasks, &mut Init::new(seed, device))
+    }
+
+    /// The same with parameters drawn after others.
+    pub(crate) fn drawn(config: &E::Config, n_slots: usize, n_tasks: usize, init: &mut Init) -> Self {
         let (n_hidden, n_program) = E::widths(config);
         Self {
             encoder: E::new(config, n_slots, init),

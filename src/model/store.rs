@@ -17,7 +17,7 @@ use crate::model::build::{NetworkUse, with_network};
 use crate::model::config::ModelConfig;
 use crate::model::network::Network;
 use crate::model::variant::Variant;
-use crate::program::vocabulary_hash;
+use crate::program::KnownPrograms;
 use crate::seed::Seed;
 
 /// Name of the resolved configuration in a model's folder.
@@ -117,9 +117,8 @@ pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
     if config.version != ModelConfig::VERSION {
         return Err(ModelError::Version { found: config.version, path });
     }
-    let expected = vocabulary_hash();
-    if config.vocabulary != expected {
-        return Err(ModelError::Vocabulary { found: config.vocabulary, expected, path });
+    if KnownPrograms::of_hash(&config.vocabulary).is_none() {
+        return Err(ModelError::Vocabulary { found: config.vocabulary, expected: KnownPrograms::ALL.hash(), path });
     }
     if !config.network.is_for(config.variant) {
         return Err(ModelError::Network { variant: config.variant, path });

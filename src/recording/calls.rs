@@ -44,7 +44,7 @@ pub(super) fn encode_call(call: &ProgramCall) -> proto::ProgramCall {
         caller: caller.map(|caller| caller.0),
         depth: u32::from(*depth),
         step: u32::from(*step),
-        program: program_to_proto(*program).into(),
+        program: program_to_proto(*program),
         argument: argument.map(|slot| u32::from(slot.0)),
         input: Some(span(input)),
         output: output.as_ref().map(span),

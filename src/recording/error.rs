@@ -61,7 +61,7 @@ pub enum RecordingError {
         path: PathBuf,
         /// The file's hash.
         found: String,
-        /// Hash of [`crate::program::Program::ALL`].
+        /// Hash of [`KnownPrograms::ALL`](crate::program::KnownPrograms::ALL).
         expected: String,
     },
     /// A topic that every recording has is missing.

@@ -10,6 +10,7 @@ use prost::Message as _;
 use super::error::RecordingError;
 use super::schema::{Topic, foxglove, timestamp};
 use crate::artifact::{AtomicFile, IoError};
+use crate::program::KnownPrograms;
 
 const CHANNEL: u16 = 1;
 /// Fixed, because the library's default may change between versions.
@@ -40,7 +41,8 @@ impl EventWriter {
         let failed = |error| failed(path, error);
         let mut mcap = options.create(file).map_err(failed)?;
         let topic = Topic::Event;
-        let schema = mcap.add_schema(topic.message(), "protobuf", topic.descriptor()).map_err(failed)?;
+        let schema =
+            mcap.add_schema(topic.message(), "protobuf", topic.descriptor(KnownPrograms::FIRST)).map_err(failed)?;
         let no_metadata = BTreeMap::new();
         mcap.add_channel_with_id(CHANNEL, schema, topic.name(), "protobuf", &no_metadata).map_err(failed)?;
         Ok(Self { path: path.to_owned(), mcap, sequence: 0, buffer: Vec::new() })

@@ -5,7 +5,7 @@
 //! `schemas/mcap`, compiled by `build.rs`.
 
 use super::error::MessageProblem;
-use crate::program::Program;
+use crate::program::{KnownPrograms, Program};
 use crate::render::PictureFormat;
 
 /// Version of topics and messages. Raised when a reader of the version before could misread.
@@ -35,11 +35,15 @@ pub(super) enum Topic {
     Push,
 }
 
-/// The descriptor set of a message type.
-macro_rules! descriptor {
-    ($message:literal) => {
-        include_bytes!(concat!(env!("OUT_DIR"), "/descriptors/", $message, ".binpb"))
-    };
+/// Message type, number of programs known, descriptor set.
+static DESCRIPTORS: &[(&str, usize, &[u8])] = include!(concat!(env!("OUT_DIR"), "/descriptors.rs"));
+
+/// The self-contained descriptor set of a message type that a channel may carry, in a recording that knows so many
+/// programs.
+fn descriptor(message: &str, known: KnownPrograms) -> &'static [u8] {
+    let of_message = DESCRIPTORS.iter().filter(|(name, _, _)| *name == message);
+    let fitting = of_message.filter(|(_, n_programs, _)| *n_programs <= known.count());
+    fitting.max_by_key(|(_, n_programs, _)| *n_programs).map_or(&[], |(_, _, bytes)| *bytes)
 }
 
 impl Topic {
@@ -102,20 +106,8 @@ impl Topic {
     }
 
     /// The self-contained descriptor set of its message type.
-    pub(super) fn descriptor(self) -> &'static [u8] {
-        match self {
-            Self::EpisodeStart => descriptor!("ntp.v1.EpisodeStart"),
-            Self::EpisodeEnd => descriptor!("ntp.v1.EpisodeEnd"),
-            Self::Transforms => descriptor!("foxglove.FrameTransforms"),
-            Self::Observation => descriptor!("ntp.v1.Observation"),
-            Self::Call => descriptor!("ntp.v1.ProgramCall"),
-            Self::Return => descriptor!("ntp.v1.ProgramReturn"),
-            Self::Stack => descriptor!("ntp.v1.ProgramStack"),
-            Self::Scene => descriptor!("foxglove.SceneUpdate"),
-            Self::Event => descriptor!("foxglove.Event"),
-            Self::Log => descriptor!("foxglove.Log"),
-            Self::Push => descriptor!("ntp.v1.Push"),
-        }
+    pub(super) fn descriptor(self, known: KnownPrograms) -> &'static [u8] {
+        descriptor(self.message(), known)
     }
 }
 
@@ -175,12 +167,7 @@ impl CameraTopic {
 
     /// The self-contained descriptor set of its message type.
     pub(super) fn descriptor(self) -> &'static [u8] {
-        match self {
-            Self::Calibration => descriptor!("foxglove.CameraCalibration"),
-            Self::Transform => descriptor!("foxglove.FrameTransforms"),
-            Self::Image => descriptor!("foxglove.CompressedImage"),
-            Self::Video => descriptor!("foxglove.CompressedVideo"),
-        }
+        descriptor(self.message(), KnownPrograms::FIRST)
     }
 }
 
@@ -189,40 +176,43 @@ pub(super) fn timestamp(log_time_nanos: u64) -> Timestamp {
     Timestamp { seconds: (log_time_nanos / 1_000_000_000) as i64, nanos: (log_time_nanos % 1_000_000_000) as i32 }
 }
 
-/// The schema's name of a program.
-pub(super) fn program_to_proto(program: Program) -> proto::Program {
-    match program {
-        Program::None => proto::Program::None,
-        Program::BlockStacking => proto::Program::BlockStacking,
-        Program::ObjectSorting => proto::Program::ObjectSorting,
-        Program::PickAndPlace => proto::Program::PickAndPlace,
-        Program::PickAndDrop => proto::Program::PickAndDrop,
-        Program::Pick => proto::Program::Pick,
-        Program::Place => proto::Program::Place,
-        Program::Drop => proto::Program::Drop,
-        Program::MoveTo => proto::Program::MoveTo,
-        Program::Grip => proto::Program::Grip,
-        Program::Release => proto::Program::Release,
-        Program::TableCleanup => proto::Program::TableCleanup,
-    }
+/// The schema's number of a program: 0 is that of no program.
+pub(super) fn program_to_proto(program: Program) -> i32 {
+    program.index() as i32 + 1
 }
 
 /// The program behind a number of the schema.
 pub(super) fn program_from_proto(number: i32) -> Result<Program, MessageProblem> {
-    let unknown = || MessageProblem::UnknownProgram { number };
-    match proto::Program::try_from(number).map_err(|_error| unknown())? {
-        proto::Program::Idle => Err(unknown()),
-        proto::Program::None => Ok(Program::None),
-        proto::Program::BlockStacking => Ok(Program::BlockStacking),
-        proto::Program::ObjectSorting => Ok(Program::ObjectSorting),
-        proto::Program::PickAndPlace => Ok(Program::PickAndPlace),
-        proto::Program::PickAndDrop => Ok(Program::PickAndDrop),
-        proto::Program::Pick => Ok(Program::Pick),
-        proto::Program::Place => Ok(Program::Place),
-        proto::Program::Drop => Ok(Program::Drop),
-        proto::Program::MoveTo => Ok(Program::MoveTo),
-        proto::Program::Grip => Ok(Program::Grip),
-        proto::Program::Release => Ok(Program::Release),
-        proto::Program::TableCleanup => Ok(Program::TableCleanup),
+    let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+    index.and_then(Program::from_index).ok_or(MessageProblem::UnknownProgram { number })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_have_the_schemas_names_and_numbers() {
+        for program in Program::ALL {
+            let number = program_to_proto(program);
+            let name = proto::Program::try_from(number).map(|named| named.as_str_name().to_lowercase());
+            assert_eq!(name.as_deref(), Ok(program.name()));
+            assert_eq!(program_from_proto(number).ok(), Some(program));
+        }
+        let n_programs = Program::ALL.len() as i32;
+        for number in [i32::MIN, -1, proto::Program::Idle as i32, n_programs + 1, i32::MAX] {
+            assert!(program_from_proto(number).is_err(), "{number}");
+        }
+        assert!(proto::Program::try_from(n_programs + 1).is_err(), "the schema has no program that is not there");
+    }
+
+    #[test]
+    fn every_message_type_has_its_descriptor() {
+        for topic in Topic::ALL {
+            assert!(!topic.descriptor(KnownPrograms::FIRST).is_empty(), "{topic:?}");
+        }
+        for topic in CameraTopic::ALL {
+            assert!(!topic.descriptor().is_empty(), "{topic:?}");
+        }
     }
 }

@@ -13,7 +13,7 @@ use super::schema::{CameraTopic, Topic, proto};
 use super::{observation, pushes, start, transform, viewer};
 use crate::artifact::AtomicFile;
 use crate::geometry::Pose;
-use crate::program::Program;
+use crate::program::{KnownPrograms, Program};
 use crate::trace::{Episode, Frame};
 
 /// A chunk is closed by the first message that takes it past this size.
@@ -63,10 +63,15 @@ impl Sink {
     }
 
     /// Writes what stands before the first message.
-    pub(super) fn declare(&mut self, metadata: BTreeMap<String, String>, cameras: &Cameras) -> Result<(), McapError> {
+    pub(super) fn declare(
+        &mut self,
+        known: KnownPrograms,
+        metadata: BTreeMap<String, String>,
+        cameras: &Cameras,
+    ) -> Result<(), McapError> {
         self.mcap.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
         for topic in Topic::ALL {
-            let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor())?;
+            let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor(known))?;
             let id = channel_id(topic);
             self.mcap.add_channel_with_id(id, schema, topic.name(), "protobuf", &BTreeMap::new())?;
         }

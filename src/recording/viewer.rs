@@ -189,8 +189,8 @@ pub(super) fn event(begin_nanos: u64, end_nanos: u64, scene: &Scene, call: &Prog
 
 /// The programs that run, from the root down.
 pub(super) fn stack(running: &[Program]) -> proto::ProgramStack {
-    let at =
-        |depth: usize| running.get(depth).map_or(proto::Program::Idle, |&program| program_to_proto(program)).into();
+    let idle = proto::Program::Idle as i32;
+    let at = |depth: usize| running.get(depth).map_or(idle, |&program| program_to_proto(program));
     proto::ProgramStack {
         running: running.len() as u32,
         depth_0: at(0),

@@ -23,7 +23,7 @@ use super::schema::SCHEMA_VERSION;
 use super::sink::{Sink, Times};
 use super::transform;
 use crate::artifact::{AtomicFile, IoError};
-use crate::program::{Program, vocabulary_hash};
+use crate::program::KnownPrograms;
 use crate::render::CameraConfig;
 use crate::task::Family;
 use crate::trace::Episode;
@@ -160,15 +160,16 @@ impl ShardWriter {
 
     /// Writes what stands before the first message.
     fn declare(&mut self) -> Result<(), RecordingError> {
+        let known = self.family.map_or(KnownPrograms::FIRST, Family::programs);
         let mut metadata = BTreeMap::from([
             ("schema_version".to_owned(), SCHEMA_VERSION.to_string()),
-            ("vocabulary_hash".to_owned(), vocabulary_hash()),
-            ("programs".to_owned(), Program::ALL.map(Program::name).join(",")),
+            ("vocabulary_hash".to_owned(), known.hash()),
+            ("programs".to_owned(), known.names().collect::<Vec<_>>().join(",")),
         ]);
         if let Some(family) = self.family {
             metadata.insert("task_family".to_owned(), family.name().to_owned());
         }
-        self.sink.declare(metadata, &self.cameras).map_err(|error| failed(&self.path, error))
+        self.sink.declare(known, metadata, &self.cameras).map_err(|error| failed(&self.path, error))
     }
 
     /// Whether an episode can be told, and when it happens.

@@ -196,6 +196,7 @@ fn prepare(
 pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
     let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
+    let n_programs = examples.known_programs().count();
     let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
     let windows = match examples.specification() {
         SpecificationForm::Trajectories => Windows::new(n_slots, &slices),
@@ -208,7 +209,7 @@ pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>
     };
     let programs = part
         .iter()
-        .flat_map(|prepared| one_hot(Program::ALL.len(), Some(prepared.example.callee.index()), weight))
+        .flat_map(|prepared| one_hot(n_programs, Some(prepared.example.callee.index()), weight))
         .collect();
     let arguments = part.iter().any(|prepared| !prepared.example.arguments.is_empty()).then(|| {
         let value = 1.0 / counts.arguments as f32;

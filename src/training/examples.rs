@@ -17,7 +17,7 @@ use rand::Rng;
 
 use crate::dataset::{DatasetTrials, TrialData};
 use crate::model::{Decisions, Given};
-use crate::program::Program;
+use crate::program::{KnownPrograms, Program};
 use crate::scene::SlotIndex;
 use crate::task::Split;
 use crate::trace::{Observation, ProgramCall, Span, SpecificationForm, instruction_spans};
@@ -183,6 +183,11 @@ impl<'d> Examples<'d> {
     /// The dataset behind.
     pub fn data(&self) -> &'d DatasetTrials {
         self.data
+    }
+
+    /// The programs that a network must know to learn from them: those of the trials' family.
+    pub fn known_programs(&self) -> KnownPrograms {
+        self.data.trials.first().map_or(KnownPrograms::FIRST, |trial| trial.family.programs())
     }
 
     /// Draws of a level: a task, a trial of it, a decision in it or all of a call, and the demonstration beside it.

@@ -12,7 +12,6 @@ use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use crate::model::Network;
-use crate::program::Program;
 use crate::trace::ScopingLabel;
 use crate::training::batch::{Group, Part};
 use crate::training::config::LossWeights;
@@ -169,7 +168,7 @@ pub fn losses<N: Network>(
     let demonstration = network.demonstration(&part.windows, percepts);
     let reading = network.read(&demonstration, &part.states, percepts, &part.given);
     let (core, _) = network.core(&reading, part.program, &part.steps, None);
-    let programs = TensorData::new(part.programs.clone(), [n_batch, Program::ALL.len()]);
+    let programs = TensorData::new(part.programs.clone(), core.programs.dims());
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
     let ends = Tensor::from_data(TensorData::new(part.ends.clone(), [n_batch, 1]), &device);
     let end = binary_cross_entropy(core.end.clone(), ends).mul_scalar(part.weight);

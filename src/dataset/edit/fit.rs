@@ -11,7 +11,7 @@ use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::{CameraInfo, FeatureInfo, LEROBOT_VERSION, NTP_VERSION};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::program::vocabulary_hash;
+use crate::program::KnownPrograms;
 
 /// Whether a dataset is one that this version can edit.
 pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
@@ -25,7 +25,7 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = format!("schema_version is {}, but {NTP_VERSION} is edited", ntp.schema_version);
         return refused("edit.version", layout::NTP_INFO, problem);
     }
-    if ntp.annotated_by.is_none() && ntp.vocabulary_hash != vocabulary_hash() {
+    if ntp.annotated_by.is_none() && KnownPrograms::of_hash(&ntp.vocabulary_hash).is_none() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }

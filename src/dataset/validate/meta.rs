@@ -14,7 +14,7 @@ use crate::dataset::statistics::FeatureStatistics;
 use crate::dataset::tables::frames::feature::{FEATURES, Feature};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};
 use crate::dataset::{DatasetError, EpisodePictures};
-use crate::program::vocabulary_hash;
+use crate::program::KnownPrograms;
 use crate::table::{Columns, TableError, TableReader};
 
 /// Checks the files below `meta/` and `ntp/info.json`.
@@ -97,7 +97,7 @@ fn check_ntp_info(root: &Path, validation: &mut Validation) {
             if info.schema_version != NTP_VERSION {
                 error("schema_version", format!("it is {}, but {NTP_VERSION} is read", info.schema_version));
             }
-            if info.vocabulary_hash != vocabulary_hash() {
+            if KnownPrograms::of_hash(&info.vocabulary_hash).is_none() {
                 error("vocabulary_hash", "the programs are not those of this version".to_owned());
             }
         }

@@ -18,7 +18,7 @@ use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 use crate::dataset::tables::view::{EpisodePlaces, EpisodeView, Source};
 use crate::dataset::tables::{calls, episodes, meta_episodes, scopes};
 use crate::dataset::write::summary::ConvertSummary;
-use crate::program::{Program, vocabulary_hash};
+use crate::program::KnownPrograms;
 use crate::recording::CameraPictures;
 use crate::table::{TableRows as _, TableSchema, TableWriter, TextTable, Values, WriteOptions};
 use crate::task::Family;
@@ -262,6 +262,7 @@ impl Tables {
     }
 
     fn ntp_info(&self, config: &ConvertConfig, failed_left_out: u64) -> NtpInfo {
+        let known = self.families.iter().map(|family| family.programs()).max().unwrap_or(KnownPrograms::FIRST);
         NtpInfo {
             schema_version: NTP_VERSION,
             ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -269,8 +270,8 @@ impl Tables {
             families: self.families.iter().map(|family| family.name().to_owned()).collect(),
             n_slots: self.n_slots,
             slots: self.slots.clone(),
-            vocabulary: Program::ALL.map(|program| program.name().to_owned()).into(),
-            vocabulary_hash: vocabulary_hash(),
+            vocabulary: known.names().map(ToOwned::to_owned).collect(),
+            vocabulary_hash: known.hash(),
             total_calls: self.n_calls,
             total_scopes: self.n_scopes,
             failed_left_out,

@@ -6,7 +6,7 @@ use std::io::{Cursor, Seek as _, SeekFrom, Write as _};
 
 use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::{Attachment, Message, MessageStream, WriteOptions, Writer};
-use ntp::program::vocabulary_hash;
+use ntp::program::KnownPrograms;
 use ntp::recording::{Damage, EpisodeProblem, MessageProblem, RecordingError, ShardReader, ShardWriter, inspect};
 use ntp::scene::BodyIndex;
 use ntp::task::{Family, Split};
@@ -97,7 +97,7 @@ struct Forged {
 impl Forged {
     /// As ours.
     fn sound() -> Self {
-        let metadata = [("schema_version", "1".to_owned()), ("vocabulary_hash", vocabulary_hash())];
+        let metadata = [("schema_version", "1".to_owned()), ("vocabulary_hash", KnownPrograms::ALL.hash())];
         Self {
             metadata: metadata.map(|(key, value)| (key.to_owned(), value)).into(),
             plan: Some(PLAN),

@@ -10,6 +10,7 @@ use crate::dataset::files::layout;
 use crate::dataset::tables::annotated::vocabulary;
 use crate::dataset::tables::frames::feature::{FEATURES, declared};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
+use crate::program::KnownPrograms;
 
 impl Target {
     /// Ends the dataset. `failed_left_out` is what its sources left out of their recordings.
@@ -67,10 +68,23 @@ impl Target {
         Features(declared(slots).0.into_iter().chain(others).collect())
     }
 
+    /// As many programs as the first dataset knows, or more where the episodes' families need them.
+    fn known_programs(&self) -> KnownPrograms {
+        let first = KnownPrograms::of_hash(&self.ntp.vocabulary_hash);
+        first
+            .into_iter()
+            .chain(self.families.iter().map(|family| family.programs()))
+            .max()
+            .unwrap_or(KnownPrograms::ALL)
+    }
+
     fn ntp_info(&self, slots: Vec<String>, failed_left_out: u64) -> NtpInfo {
         let (vocabulary, vocabulary_hash) = match &self.ntp.annotated_by {
             Some(_) => vocabulary(self.subtasks.texts()),
-            None => (self.ntp.vocabulary.clone(), self.ntp.vocabulary_hash.clone()),
+            None => {
+                let known = self.known_programs();
+                (known.names().map(ToOwned::to_owned).collect(), known.hash())
+            }
         };
         NtpInfo {
             vocabulary,
