@@ -20,7 +20,7 @@
 use crate::program::Program;
 use crate::robot::{Action, RobotApi, judge};
 use crate::scene::{SceneState, SlotIndex, lies_in_any_container};
-use crate::task::{Condition, Goal, Task};
+use crate::task::{Goal, SubTask, Task};
 use crate::trace::{CallRecorder, Cause, Episode, EpisodeParts, NewCall, Outcome, Provenance, Span, TraceError};
 
 /// Acts out a task once. What goes wrong in physics is the episode's outcome, not an error.
@@ -64,9 +64,11 @@ enum Then {
 impl Run<'_> {
     fn root(&mut self, task: &Task) -> Result<(), Cause> {
         for goal in &task.goals {
-            match goal.brings_about(task.family) {
-                Condition::OnTop { .. } => self.bring(*goal, Program::PickAndPlace, Program::Place)?,
-                Condition::Inside { .. } => self.sort_category(*goal)?,
+            let sub_task = goal.brings_about(task.family).sub_task();
+            if sub_task.for_each {
+                self.bring_each(*goal, sub_task)?;
+            } else {
+                self.bring(*goal, sub_task)?;
             }
         }
         self.call(Program::None, None, Then::End);
@@ -75,10 +77,10 @@ impl Run<'_> {
     }
 
     /// Brings every instance of a category into its container.
-    fn sort_category(&mut self, goal: Goal) -> Result<(), Cause> {
+    fn bring_each(&mut self, goal: Goal, sub_task: SubTask) -> Result<(), Cause> {
         while self.n_unsorted(goal.source) > 0 {
             let before = self.n_unsorted(goal.source);
-            self.bring(goal, Program::PickAndDrop, Program::Drop)?;
+            self.bring(goal, sub_task)?;
             if self.n_unsorted(goal.source) >= before {
                 return Err(Cause::DroppedObject);
             }
@@ -94,12 +96,12 @@ impl Run<'_> {
     }
 
     /// One sub-task: pick the source, then put it down at the target.
-    fn bring(&mut self, goal: Goal, sub_task: Program, put: Program) -> Result<(), Cause> {
-        self.call(sub_task, None, Then::Continue);
+    fn bring(&mut self, goal: Goal, sub_task: SubTask) -> Result<(), Cause> {
+        self.call(sub_task.program, None, Then::Continue);
         self.call(Program::Pick, None, Then::Continue);
         self.act(Program::MoveTo, Some(goal.source), Then::Continue)?;
         self.act(Program::Grip, None, Then::End)?;
-        self.call(put, None, Then::End);
+        self.call(sub_task.put, None, Then::End);
         self.act(Program::MoveTo, Some(goal.target), Then::Continue)?;
         self.act(Program::Release, None, Then::End)
     }

@@ -131,6 +131,13 @@ pub struct Slot {
     pub bodies: Vec<BodyIndex>,
 }
 
+impl Slot {
+    /// A slot that always shows one body, given by its number.
+    pub fn single(name: String, body: usize) -> Self {
+        Self { name, bodies: vec![BodyIndex(body as u16)] }
+    }
+}
+
 /// The unchanging part of an episode's world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {

@@ -6,109 +6,27 @@
 //! The split is decided here and nowhere else.
 
 mod check;
+mod family;
 mod file;
 mod goal;
 mod import;
-mod layout;
 mod order;
 mod sampler;
 mod set;
+mod trial;
 
+pub use family::{Bodies, Family, FrontView, Room, SlotKind};
 pub use file::TaskFileError;
-pub use goal::{Condition, Goal, condition_holds, rests_on};
+pub use goal::{Condition, Goal, SubTask, condition_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
-pub use layout::{CONTAINER_HALF_M, Trial, initial_state, scene};
 pub use sampler::{SampleError, TaskPool, sample};
 pub use set::{TaskSet, TaskSetError};
+pub use trial::{Trial, initial_state, scene};
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-
-use crate::program::{KnownPrograms, Program};
-use crate::scene::SlotIndex;
-
-/// A kind of task: its objects, its programs, its goal conditions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Family {
-    /// Eight lettered blocks are stacked into towers.
-    BlockStacking,
-    /// Objects of four categories are put into four containers.
-    ObjectSorting,
-    /// Bowls are stacked on a tray and forks put into the topmost; the tray is carried away.
-    TableCleanup,
-}
-
-impl Family {
-    /// Every family.
-    pub const ALL: [Self; 3] = [Self::BlockStacking, Self::ObjectSorting, Self::TableCleanup];
-
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::BlockStacking => "block_stacking",
-            Self::ObjectSorting => "object_sorting",
-            Self::TableCleanup => "table_cleanup",
-        }
-    }
-
-    /// The start of suite names: `stacking_unseen`, `sorting_unseen`, `cleanup_unseen`.
-    pub fn short_name(self) -> &'static str {
-        match self {
-            Self::BlockStacking => "stacking",
-            Self::ObjectSorting => "sorting",
-            Self::TableCleanup => "cleanup",
-        }
-    }
-
-    /// The program at the root of its call trees.
-    pub fn root_program(self) -> Program {
-        match self {
-            Self::BlockStacking => Program::BlockStacking,
-            Self::ObjectSorting => Program::ObjectSorting,
-            Self::TableCleanup => Program::TableCleanup,
-        }
-    }
-
-    /// The programs that its recordings, datasets and models know.
-    pub fn programs(self) -> KnownPrograms {
-        KnownPrograms::up_to(self.root_program())
-    }
-
-    /// How many slots its scenes have.
-    pub fn n_slots(self) -> usize {
-        match self {
-            Self::BlockStacking | Self::ObjectSorting => 8,
-            Self::TableCleanup => 6,
-        }
-    }
-
-    /// The most instances of one category that the table holds; nothing for a family without categories.
-    pub fn max_instances(self) -> Option<u16> {
-        match self {
-            Self::BlockStacking => None,
-            Self::ObjectSorting => Some(layout::MAX_INSTANCES),
-            Self::TableCleanup => Some(layout::cleanup::MAX_FORKS),
-        }
-    }
-
-    /// The most blocks that a task can have within reach; nothing for a family without blocks.
-    pub fn max_blocks(self) -> Option<u16> {
-        (self == Self::BlockStacking).then_some(layout::stacking::N_BLOCKS)
-    }
-
-    /// The most bowls that a task can ask for; nothing for a family without bowls.
-    pub fn max_bowls(self) -> Option<u16> {
-        (self == Self::TableCleanup).then_some(layout::cleanup::N_BOWLS)
-    }
-
-    /// The slot of what is carried away in the end, if anything is.
-    pub fn tray(self) -> Option<SlotIndex> {
-        (self == Self::TableCleanup).then_some(layout::cleanup::TRAY)
-    }
-}
 
 /// A name that is not of the set that is asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -200,33 +118,42 @@ impl Task {
         conditions
     }
 
-    /// Counts of a trial, with what `draw` gives for each category; empty for a family without. Of Table Clean-up 1 for
-    /// each bowl that is asked for and 0 for the others, then the forks; of Block Stacking 1 for each block within reach
-    /// and 0 for the others, where there are others.
+    /// Counts of a trial: how many bodies slots show, in the order of slots. Of a category, what `draw` gives; of what
+    /// stands aside unless it is asked for, 1 or 0; of blocks, 1 for each within reach and 0 for the others, where there
+    /// are others. What is always there is not counted.
     pub fn counts(&self, mut draw: impl FnMut() -> u16) -> Vec<u16> {
-        let is_asked_for = |bowl: u16| u16::from(self.goals.iter().any(|goal| goal.source == SlotIndex(bowl)));
-        match self.family {
-            Family::BlockStacking => self.blocks.map_or_else(Vec::new, layout::stacking::counts),
-            Family::ObjectSorting => (0..check::N_CATEGORIES).map(|_| draw()).collect(),
-            Family::TableCleanup => (0..layout::cleanup::N_BOWLS).map(is_asked_for).chain([draw()]).collect(),
+        let is_brought = |slot: usize| self.goals.iter().any(|goal| usize::from(goal.source.0) == slot);
+        let mut counts = Vec::new();
+        for (kind, slots) in self.family.kinds_with_slots() {
+            for (number, slot) in slots.enumerate() {
+                counts.extend(match kind.bodies {
+                    Bodies::One => None,
+                    Bodies::OneWithinReach => self.blocks.map(|blocks| u16::from(number < usize::from(blocks))),
+                    Bodies::OneIfAsked => Some(u16::from(is_brought(slot))),
+                    Bodies::Many { .. } => Some(draw()),
+                });
+            }
         }
+        counts
     }
 
     /// How many bowls it asks for; 0 in families without.
     pub fn n_bowls(&self) -> u16 {
-        let is_bowl = |goal: &&Goal| goal.source.0 < self.family.max_bowls().unwrap_or(0);
+        let bodies = |slot| self.family.kind(slot).map(|kind| kind.bodies);
+        let is_bowl = |goal: &&Goal| bodies(goal.source) == Some(Bodies::OneIfAsked);
         self.goals.iter().filter(is_bowl).count() as u16
     }
 
     /// The task in a sentence.
     pub fn text(&self) -> String {
-        let slot = |index: SlotIndex| layout::slot_name(self.family, index);
-        let part = |goal: &Goal| match goal.brings_about(self.family) {
-            Condition::OnTop { upper, lower } => format!("put {} on {}", slot(upper), slot(lower)),
-            Condition::Inside { category, container } => {
-                format!("put every {} into {}", slot(category), slot(container))
-            }
-        };
+        let name = |slot| self.family.slot_name(slot);
+        let part = |goal: &Goal| goal.brings_about(self.family).in_words(name(goal.source), name(goal.target));
         self.goals.iter().map(part).collect::<Vec<_>>().join(", then ")
+    }
+
+    /// A task whose conditions are what its goals bring about.
+    fn of_goals(id: String, family: Family, goals: Vec<Goal>, split: Split) -> Self {
+        let conditions = goals.iter().map(|goal| goal.brings_about(family)).collect();
+        Self { id, family, goals, conditions, split, blocks: None }
     }
 }

@@ -87,8 +87,8 @@ impl Pipeline {
         }
         let (train, unseen) = (tasks.train, self.n_unseen());
         let (train_limit, unseen_limit) = tasks.pool().limits(train);
-        if tasks.family == Family::ObjectSorting && train != train_limit {
-            let problem = format!("is {train}; object_sorting has {train_limit} training mappings");
+        if let Some(all) = tasks.family.all_seen().filter(|_| train != train_limit) {
+            let problem = format!("is {train}; {} has {train_limit} {all}", tasks.family.name());
             return Err(self.value("tasks.train", problem));
         }
         let blocks = tasks.pool().blocks.map_or_else(String::new, |blocks| format!(" with {blocks} blocks"));
@@ -258,9 +258,11 @@ impl Pipeline {
         }
         let family = self.spec.tasks.family;
         let said = [("adversary", suite.adversary.is_some()), ("order", suite.order != OrderSpec::Own)];
-        match said.into_iter().find(|&(_, is_said)| is_said && family != Family::BlockStacking) {
+        match said.into_iter().find(|&(_, is_said)| is_said && !family.builds_towers()) {
             Some((field, _)) => {
-                let problem = format!("{} builds no towers; allowed for block_stacking", family.name());
+                let builders = Family::ALL.into_iter().filter(|family| family.builds_towers()).map(Family::name);
+                let allowed = builders.collect::<Vec<_>>().join(", ");
+                let problem = format!("{} builds no towers; allowed for {allowed}", family.name());
                 Err(self.value(&key(field), problem))
             }
             None => Ok(()),

@@ -7,7 +7,7 @@
 
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::scene::SceneState;
-use crate::task::Family;
+use crate::task::{Family, FrontView};
 
 /// What a camera is fixed to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +45,8 @@ impl Camera {
 
     /// Third person, fixed: before the table and above it, with all that a family's programs reach in its picture.
     pub fn front(family: Family, size_px: [u32; 2]) -> Self {
-        let (eye, target) = match family {
-            Family::BlockStacking => (Vec3::new(0.0, -0.80, 0.86), Vec3::new(0.0, 0.015, 0.075)),
-            Family::ObjectSorting => (Vec3::new(0.0, -1.16, 1.34), Vec3::new(0.0, 0.03, 0.02)),
-            Family::TableCleanup => (Vec3::new(0.0, -1.40, 1.62), Vec3::new(0.0, 0.04, 0.02)),
-        };
-        Self::new(Mount::World(looking_at(&eye, &target)), size_px, FRONT_FOV_RAD)
+        let FrontView { eye_m, target_m } = family.front_view();
+        Self::new(Mount::World(looking_at(&eye_m.into(), &target_m.into())), size_px, FRONT_FOV_RAD)
     }
 
     /// First person: behind the gripper's hand, looking at what is between and below its fingers.

@@ -16,7 +16,7 @@ use crate::model::Decisions;
 use crate::rollout::divergence::decided_of;
 use crate::rollout::expected_calls;
 use crate::scene::{BodyIndex, Scene, SlotIndex};
-use crate::task::{Family, rests_on};
+use crate::task::rests_on;
 use crate::trace::{Episode, Observation, ProgramCall, SpecificationForm, instruction_spans, instructions};
 
 /// The expert's way through one episode.
@@ -57,7 +57,7 @@ impl Expectation {
                 _ => sub_tasks.push(SubTask { calls: vec![call.clone()], stacked: None }),
             }
         }
-        if family == Family::BlockStacking {
+        if family.builds_towers() {
             sub_tasks.iter_mut().for_each(|sub_task| sub_task.stacked = Stacked::of(&sub_task.calls, scene));
         }
         let whole = demonstration.calls.first().and_then(|root| root.output);

@@ -3,12 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::scene::SlotIndex;
-use crate::task::layout::cleanup::{FORK, TRAY};
-use crate::task::layout::slot_name;
-use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
-
-/// How many slots of Object Sorting are categories; the others are containers.
-pub(super) const N_CATEGORIES: u16 = 4;
+use crate::task::{Condition, Family, Goal, Room, SlotKind, Split, Task, TaskSet, TaskSetError};
 
 /// See [`TaskSet::validate`].
 pub(super) fn check(set: &TaskSet) -> Result<(), TaskSetError> {
@@ -41,9 +36,7 @@ fn check_task(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     check_slots(task_idx, task)?;
     check_blocks(task_idx, task)?;
     check_moves(task_idx, task)?;
-    if task.family != Family::ObjectSorting {
-        check_towers(task_idx, task)?;
-    }
+    check_towers(task_idx, task)?;
     let brought: Vec<Condition> = task.goals.iter().map(|&goal| goal.brings_about(task.family)).collect();
     match task.conditions.iter().position(|condition| !brought.contains(condition)) {
         Some(at) => Err(TaskSetError::ConditionWithoutGoal { place: format!("tasks[{task_idx}].conditions[{at}]") }),
@@ -58,36 +51,27 @@ fn goal_place(task_idx: usize, goal_idx: usize) -> String {
 fn check_slots(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     for (goal_idx, goal) in task.goals.iter().enumerate() {
         let place = goal_place(task_idx, goal_idx);
-        check_slot(task.family, &format!("{place}.source"), goal.source, Part::Source)?;
-        check_slot(task.family, &format!("{place}.target"), goal.target, Part::Target)?;
+        let place_of = |part| format!("{place}.{part}");
+        check_slot(task.family, place_of("source"), goal.source, |kind| kind.brings_about.is_some())?;
+        check_slot(task.family, place_of("target"), goal.target, |kind| kind.room != Room::Nothing)?;
         if goal.source == goal.target {
-            return Err(TaskSetError::OwnTarget { place, slot: slot_name(task.family, goal.source) });
+            let slot = task.family.slot_name(goal.source).to_owned();
+            return Err(TaskSetError::OwnTarget { place, slot });
         }
     }
     Ok(())
 }
 
-/// What a slot is in a goal.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Part {
-    Source,
-    Target,
-}
-
-fn check_slot(family: Family, place: &str, slot: SlotIndex, part: Part) -> Result<(), TaskSetError> {
-    let place = place.to_owned();
-    if usize::from(slot.0) >= family.n_slots() {
+fn check_slot(family: Family, place: String, slot: SlotIndex, fits: fn(&SlotKind) -> bool) -> Result<(), TaskSetError> {
+    let Some(kind) = family.kind(slot) else {
         return Err(TaskSetError::SlotOutOfRange { place, slot, n_slots: family.n_slots() });
-    }
-    let is_category = slot.0 < N_CATEGORIES;
-    let (fits, expected) = match (family, part) {
-        (Family::BlockStacking, _) => (true, "block"),
-        (Family::ObjectSorting, Part::Source) => (is_category, "category"),
-        (Family::ObjectSorting, Part::Target) => (!is_category, "container"),
-        (Family::TableCleanup, Part::Source) => (slot != TRAY, "bowl or fork"),
-        (Family::TableCleanup, Part::Target) => (slot != FORK, "bowl or tray"),
     };
-    if fits { Ok(()) } else { Err(TaskSetError::WrongKind { place, slot: slot_name(family, slot), expected }) }
+    if fits(kind) {
+        return Ok(());
+    }
+    let fitting: Vec<&str> = family.kinds().iter().filter(|kind| fits(kind)).map(|kind| kind.name).collect();
+    let (slot, expected) = (family.slot_name(slot).to_owned(), fitting.join(" or "));
+    Err(TaskSetError::WrongKind { place, slot, expected })
 }
 
 /// What a task moves must be within reach.
@@ -99,7 +83,7 @@ fn check_blocks(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     }
     for (goal_idx, goal) in task.goals.iter().enumerate() {
         if let Some(slot) = [goal.source, goal.target].into_iter().find(|slot| slot.0 >= blocks) {
-            let slot = slot_name(task.family, slot);
+            let slot = task.family.slot_name(slot).to_owned();
             return Err(TaskSetError::Aside { place: goal_place(task_idx, goal_idx), slot, blocks });
         }
     }
@@ -109,7 +93,7 @@ fn check_blocks(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
 fn check_moves(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
     for (goal_idx, goal) in task.goals.iter().enumerate() {
         if let Some(first) = task.goals[..goal_idx].iter().position(|earlier| earlier.source == goal.source) {
-            let slot = slot_name(task.family, goal.source);
+            let slot = task.family.slot_name(goal.source).to_owned();
             return Err(TaskSetError::MovedTwice { place: goal_place(task_idx, goal_idx), slot, first });
         }
     }
@@ -117,8 +101,11 @@ fn check_moves(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
 }
 
 fn check_towers(task_idx: usize, task: &Task) -> Result<(), TaskSetError> {
-    let name = |slot: SlotIndex| slot_name(task.family, slot);
+    let name = |slot: SlotIndex| task.family.slot_name(slot).to_owned();
     for (goal_idx, goal) in task.goals.iter().enumerate() {
+        if task.family.kind(goal.target).is_some_and(|kind| matches!(kind.room, Room::Many { .. })) {
+            continue;
+        }
         let place = || goal_place(task_idx, goal_idx);
         if let Some(first) = task.goals[..goal_idx].iter().position(|earlier| earlier.target == goal.target) {
             return Err(TaskSetError::TargetTaken { place: place(), slot: name(goal.target), first });

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::artifact::{self, IoError};
 use crate::scene::SlotIndex;
-use crate::task::layout::slot_name;
 use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
 
 /// Version of the file. A reader takes no other.
@@ -74,42 +73,12 @@ struct TaskEntry {
     /// Whether it may be trained on.
     split: Split,
     /// The sub-tasks in the order of the demonstration.
-    goals: Vec<GoalEntry>,
+    goals: Vec<Goal<String>>,
     /// What must hold in the end.
-    conditions: Vec<ConditionEntry>,
+    conditions: Vec<Condition<String>>,
     /// Block Stacking: only the first so many blocks, 2 to 7, are within reach; left out when all eight are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     blocks: Option<u16>,
-}
-
-/// Brings one thing onto or into another.
-#[derive(Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct GoalEntry {
-    /// Name of the slot to bring, e.g. `block_D`; of a category, all of its instances.
-    source: String,
-    /// Name of the slot to bring it to.
-    target: String,
-}
-
-/// Something that must hold in the end.
-#[derive(Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-enum ConditionEntry {
-    /// One body rests on another, or in it if that is a bowl or tray.
-    OnTop {
-        /// Name of the body on top.
-        upper: String,
-        /// Name of the body below.
-        lower: String,
-    },
-    /// Every instance of a category lies in a container.
-    Inside {
-        /// Name of the category.
-        category: String,
-        /// Name of the container.
-        container: String,
-    },
 }
 
 /// Read before the rest, so that another version is told as that and not as an unknown field.
@@ -161,19 +130,12 @@ impl TaskSet {
 }
 
 fn entry(task: &Task) -> TaskEntry {
-    let name = |slot: SlotIndex| slot_name(task.family, slot);
-    let goal = |goal: &Goal| GoalEntry { source: name(goal.source), target: name(goal.target) };
-    let condition = |condition: &Condition| match *condition {
-        Condition::OnTop { upper, lower } => ConditionEntry::OnTop { upper: name(upper), lower: name(lower) },
-        Condition::Inside { category, container } => {
-            ConditionEntry::Inside { category: name(category), container: name(container) }
-        }
-    };
+    let name = |slot: SlotIndex| task.family.slot_name(slot).to_owned();
     TaskEntry {
         id: task.id.clone(),
         split: task.split,
-        goals: task.goals.iter().map(goal).collect(),
-        conditions: task.conditions.iter().map(condition).collect(),
+        goals: task.goals.iter().map(|goal| Goal { source: name(goal.source), target: name(goal.target) }).collect(),
+        conditions: task.conditions.iter().map(|condition| condition.map(name)).collect(),
         blocks: task.blocks,
     }
 }
@@ -193,41 +155,23 @@ impl SlotNames<'_> {
     fn task(&self, task_idx: usize, entry: TaskEntry) -> Result<Task, TaskFileError> {
         let TaskEntry { id, split, goals, conditions, blocks } = entry;
         let goals = goals.iter().enumerate().map(|(at, goal)| {
-            let place = format!("tasks[{task_idx}].goals[{at}]");
-            let (source, target) = self.pair(&place, ("source", &goal.source), ("target", &goal.target))?;
-            Ok(Goal { source, target })
+            let slot = |key, word| self.slot(&format!("tasks[{task_idx}].goals[{at}].{key}"), word);
+            Ok(Goal { source: slot("source", &goal.source)?, target: slot("target", &goal.target)? })
         });
-        let conditions = conditions.iter().enumerate().map(|(at, condition)| {
-            let place = format!("tasks[{task_idx}].conditions[{at}]");
-            match condition {
-                ConditionEntry::OnTop { upper, lower } => self
-                    .pair(&place, ("upper", upper), ("lower", lower))
-                    .map(|(upper, lower)| Condition::OnTop { upper, lower }),
-                ConditionEntry::Inside { category, container } => self
-                    .pair(&place, ("category", category), ("container", container))
-                    .map(|(category, container)| Condition::Inside { category, container }),
-            }
+        let conditions = conditions.into_iter().enumerate().map(|(at, condition)| {
+            condition.try_map(|key, word| self.slot(&format!("tasks[{task_idx}].conditions[{at}].{key}"), &word))
         });
         let goals = goals.collect::<Result<_, TaskFileError>>()?;
         let conditions = conditions.collect::<Result<_, TaskFileError>>()?;
         Ok(Task { id, family: self.family, goals, conditions, split, blocks })
     }
 
-    fn pair(
-        &self,
-        place: &str,
-        first: (&str, &str),
-        second: (&str, &str),
-    ) -> Result<(SlotIndex, SlotIndex), TaskFileError> {
-        Ok((self.slot(place, first)?, self.slot(place, second)?))
-    }
-
-    fn slot(&self, place: &str, (key, word): (&str, &str)) -> Result<SlotIndex, TaskFileError> {
+    fn slot(&self, place: &str, word: &str) -> Result<SlotIndex, TaskFileError> {
         let slots = (0..self.family.n_slots() as u16).map(SlotIndex);
-        let name = |slot: SlotIndex| slot_name(self.family, slot);
+        let name = |slot: SlotIndex| self.family.slot_name(slot);
         slots.clone().find(|&slot| name(slot) == word).ok_or_else(|| TaskFileError::UnknownSlot {
             path: self.path.to_owned(),
-            place: format!("{place}.{key}"),
+            place: place.to_owned(),
             word: word.to_owned(),
             allowed: slots.map(name).collect::<Vec<_>>().join(", "),
         })

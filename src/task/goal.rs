@@ -1,58 +1,118 @@
-//! Sub-tasks and end conditions, and whether a scene meets them.
+//! Sub-tasks and end conditions, and whether a scene meets them. A kind of condition is declared here and nowhere else.
 //!
 //! # Source
 //!
 //! The authors' task file: a stacking condition holds when the centres are at most 5 cm apart horizontally and the
 //! upper one is above. We also ask that the upper block rests on the lower one.
 
+use std::convert::Infallible;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::{Vec3, horizontal_distance};
+use crate::program::Program;
 use crate::scene::{Scene, SceneState, SlotIndex, lies_inside};
 use crate::task::Family;
-use crate::task::layout::cleanup::FORK;
 
-/// One sub-task: bring what `source` shows onto or into what `target` shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Goal {
-    /// The slot to bring; of a category all of its instances.
-    pub source: SlotIndex,
+/// One sub-task: bring what `source` shows onto or into what `target` shows. Task files tell slots by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "GoalEntry")]
+pub struct Goal<S = SlotIndex> {
+    /// The slot to bring, e.g. `block_D`; of a category, all of its instances.
+    pub source: S,
     /// The slot to bring it to.
-    pub target: SlotIndex,
+    pub target: S,
 }
 
 impl Goal {
     /// What it brings about in a family.
     pub fn brings_about(self, family: Family) -> Condition {
-        let Self { source, target } = self;
-        let is_category = match family {
-            Family::BlockStacking => false,
-            Family::ObjectSorting => true,
-            Family::TableCleanup => source == FORK,
-        };
-        if is_category {
-            Condition::Inside { category: source, container: target }
-        } else {
-            Condition::OnTop { upper: source, lower: target }
-        }
+        let brings_about = family.kind(self.source).and_then(|kind| kind.brings_about);
+        brings_about.unwrap_or(Condition::on_top)(self.source, self.target)
     }
 }
 
-/// Something that must hold in the end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Condition {
-    /// The upper slot's body rests on the lower slot's.
+/// Something that must hold in the end. Task files tell slots by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(rename = "ConditionEntry")]
+pub enum Condition<S = SlotIndex> {
+    /// One body rests on another, or in it if that is a bowl or tray.
     OnTop {
         /// The body on top.
-        upper: SlotIndex,
+        upper: S,
         /// The body below.
-        lower: SlotIndex,
+        lower: S,
     },
-    /// Every body of the category's slot lies in the container's.
+    /// Every instance of a category lies in a container.
     Inside {
-        /// The slot of a category.
-        category: SlotIndex,
-        /// The slot of a container.
-        container: SlotIndex,
+        /// The category.
+        category: S,
+        /// The container.
+        container: S,
     },
+}
+
+/// The programs that bring a condition about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SubTask {
+    /// What the root calls.
+    pub program: Program,
+    /// What it calls once it has picked something.
+    pub put: Program,
+    /// Whether it is called until nothing of the source is left to bring.
+    pub for_each: bool,
+}
+
+impl<S> Condition<S> {
+    /// The upper slot's body rests on the lower slot's.
+    pub fn on_top(upper: S, lower: S) -> Self {
+        Self::OnTop { upper, lower }
+    }
+
+    /// Every body of the category's slot lies in the container's.
+    pub fn inside(category: S, container: S) -> Self {
+        Self::Inside { category, container }
+    }
+
+    /// The programs that bring it about.
+    pub fn sub_task(&self) -> SubTask {
+        match self {
+            Self::OnTop { .. } => SubTask { program: Program::PickAndPlace, put: Program::Place, for_each: false },
+            Self::Inside { .. } => SubTask { program: Program::PickAndDrop, put: Program::Drop, for_each: true },
+        }
+    }
+
+    /// Bringing it about, in words.
+    pub(super) fn in_words(&self, source: &str, target: &str) -> String {
+        match self {
+            Self::OnTop { .. } => format!("put {source} on {target}"),
+            Self::Inside { .. } => format!("put every {source} into {target}"),
+        }
+    }
+
+    /// The same with slots told otherwise; `tell` is given the part that a slot has in it.
+    pub(super) fn try_map<T, E>(
+        self,
+        mut tell: impl FnMut(&'static str, S) -> Result<T, E>,
+    ) -> Result<Condition<T>, E> {
+        Ok(match self {
+            Self::OnTop { upper, lower } => {
+                Condition::OnTop { upper: tell("upper", upper)?, lower: tell("lower", lower)? }
+            }
+            Self::Inside { category, container } => {
+                Condition::Inside { category: tell("category", category)?, container: tell("container", container)? }
+            }
+        })
+    }
+
+    /// The same with slots told otherwise.
+    pub(super) fn map<T>(self, mut tell: impl FnMut(S) -> T) -> Condition<T> {
+        let Ok(mapped) = self.try_map(|_part, slot| Ok::<T, Infallible>(tell(slot)));
+        mapped
+    }
 }
 
 /// Largest horizontal distance between the centres of two stacked bodies, in metres (the authors' value).

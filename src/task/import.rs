@@ -215,11 +215,11 @@ fn task(node: &Node<'_>, objects: &[&str], family: &mut Option<Family>, split: S
 }
 
 fn goal_family(node: &Node<'_>) -> Result<Family, Problem> {
-    match node.text()? {
-        "pick_place" => Ok(Family::BlockStacking),
-        "pick_release" => Ok(Family::ObjectSorting),
-        other => Err(node.unknown("goal name", other, "pick_place, pick_release")),
-    }
+    let word = node.text()?;
+    let imported = || Family::ALL.into_iter().filter_map(|family| Some((family, family.spec().imported_as?)));
+    let named = imported().find(|(_, name)| *name == word);
+    let allowed = || imported().map(|(_, name)| name).collect::<Vec<_>>().join(", ");
+    named.map(|(family, _)| family).ok_or_else(|| node.unknown("goal name", word, &allowed()))
 }
 
 /// The authors say `on_top` also of what lies in a container.

@@ -3,16 +3,13 @@
 use rand::seq::SliceRandom as _;
 
 use crate::seed::Seed;
-use crate::task::{Family, Goal, Task};
+use crate::task::{Goal, Task};
 
 impl Task {
     /// The same task with its towers built in another order, each from below as before. Nothing for a task that has
     /// no other order: of one tower, or of a family without towers.
     pub fn with_towers_shuffled(&self, seed: Seed) -> Option<Self> {
-        let towers = match self.family {
-            Family::BlockStacking => towers(&self.goals),
-            _ => Vec::new(),
-        };
+        let towers = if self.family.builds_towers() { towers(&self.goals) } else { Vec::new() };
         if towers.len() < 2 {
             return None;
         }

@@ -5,12 +5,8 @@
 //! A task depends on the seed and on its place in its split alone. So the first 20 of 1000 training tasks are the 20
 //! training tasks of a smaller experiment, and every experiment of one seed is measured on the same unseen tasks.
 
-mod cleanup;
-mod sorting;
-mod stacking;
-
 use crate::seed::Seed;
-use crate::task::{Family, Goal, Split, Task, TaskSet};
+use crate::task::{Family, Split, TaskSet};
 
 /// Fewer tasks can be drawn than asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -42,17 +38,10 @@ impl From<Family> for TaskPool {
 }
 
 impl TaskPool {
-    /// How many training tasks there are at most, and how many unseen ones beside `train` of them. Block Stacking
-    /// divides its end configurations as it is asked to; in the other families the two splits are fixed.
+    /// How many training tasks there are at most, and how many unseen ones beside `train` of them. Where the two
+    /// splits are fixed, `train` makes no difference.
     pub fn limits(self, train: u32) -> (u32, u32) {
-        match self.family {
-            Family::BlockStacking => {
-                let all = stacking::n_tasks(self.blocks);
-                (all, all.saturating_sub(train))
-            }
-            Family::ObjectSorting => (sorting::N_TRAINING, sorting::N_UNSEEN),
-            Family::TableCleanup => (cleanup::N_TRAINING, cleanup::N_UNSEEN),
-        }
+        (self.family.spec().sampler.limits)(self, train)
     }
 }
 
@@ -70,16 +59,6 @@ pub fn sample(pool: impl Into<TaskPool>, train: u32, unseen: u32, seed: Seed) ->
             return Err(SampleError { family, split, asked, limit });
         }
     }
-    let tasks = match family {
-        Family::BlockStacking => stacking::sample(pool.blocks, train as usize, unseen as usize, seed),
-        Family::ObjectSorting => sorting::sample(train as usize, unseen as usize, seed),
-        Family::TableCleanup => cleanup::sample(train as usize, unseen as usize, seed),
-    };
+    let tasks = (family.spec().sampler.sample)(pool, train as usize, unseen as usize, seed);
     Ok(TaskSet { family, tasks })
-}
-
-/// A task whose conditions are what its goals bring about.
-fn task(id: String, family: Family, goals: Vec<Goal>, split: Split) -> Task {
-    let conditions = goals.iter().map(|&goal| goal.brings_about(family)).collect();
-    Task { id, family, goals, conditions, split, blocks: None }
 }

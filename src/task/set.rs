@@ -89,7 +89,7 @@ pub enum TaskSetError {
         /// The slot's name.
         slot: String,
         /// What is allowed.
-        expected: &'static str,
+        expected: String,
     },
     /// A number of blocks that cannot be within reach.
     #[error(

@@ -39,7 +39,7 @@ impl Views {
     /// one that is switched off changes no other.
     pub(super) fn augment(&mut self, family: Family, config: &TrainConfig, rng: &mut impl Rng) {
         let [merged, scattered, jittered, relabelled]: [f32; 4] = rng.random();
-        let merge = Merge::draw(family, self.n_slots, rng);
+        let merge = Merge::draw(family, rng);
         let place = Place::draw(self.n_slots, rng);
         let order = relabelling(family, self.n_slots, rng);
         if let Some(merge) = merge.filter(|_| merged < config.merge_containers) {
@@ -88,17 +88,13 @@ fn put_beside(rows: &mut [f32], n_slots: usize, slot: usize, other: usize, offse
     }
 }
 
-/// Which slot each label shows: any order of blocks; categories and containers among themselves; bowls, which come before
-/// forks and tray.
+/// Which slot each label shows: those of one kind in any order among themselves.
 fn relabelling(family: Family, n_slots: usize, rng: &mut impl Rng) -> Vec<usize> {
     let mut slots: Vec<usize> = (0..n_slots).collect();
-    match family {
-        Family::BlockStacking => slots.shuffle(rng),
-        Family::TableCleanup => {
-            let n_bowls = usize::from(family.max_bowls().unwrap_or(0)).min(n_slots);
-            slots[..n_bowls].shuffle(rng);
+    for (_, of_kind) in family.kinds_with_slots() {
+        if let Some(of_kind) = slots.get_mut(of_kind) {
+            of_kind.shuffle(rng);
         }
-        Family::ObjectSorting => slots.chunks_mut(n_slots.div_ceil(2).max(1)).for_each(|kind| kind.shuffle(rng)),
     }
     slots
 }

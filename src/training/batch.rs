@@ -10,7 +10,6 @@ use rand::Rng;
 use crate::model::{Given, Pictures, Windows};
 use crate::program::Program;
 use crate::seed::Seed;
-use crate::task::Family;
 use crate::trace::{Observation, ScopingLabel, SpecificationForm};
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
@@ -185,7 +184,7 @@ fn prepare(
     // One draw, whatever the settings: see `Views::augment`.
     let mut recovery = Seed(rng.random()).rng();
     let recovers = recovery.random::<f32>() < config.recovery_states.unwrap_or_default();
-    if recovers && may_recover && family == Family::BlockStacking {
+    if recovers && may_recover && family.builds_towers() {
         let sub_tasks = examples.sub_tasks(views.example.demonstration);
         recovery::knock_over(&sub_tasks, &mut views.example, &mut views.state, &mut recovery);
     }
@@ -207,10 +206,8 @@ pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>
     let one_hot = |width: usize, hot: Option<usize>, value: f32| {
         (0..width).map(move |column| if Some(column) == hot { value } else { 0.0 })
     };
-    let programs = part
-        .iter()
-        .flat_map(|prepared| one_hot(n_programs, Some(prepared.example.callee.index()), weight))
-        .collect();
+    let programs =
+        part.iter().flat_map(|prepared| one_hot(n_programs, Some(prepared.example.callee.index()), weight)).collect();
     let arguments = part.iter().any(|prepared| !prepared.example.arguments.is_empty()).then(|| {
         let value = 1.0 / counts.arguments as f32;
         let slots = |prepared: &Views| {

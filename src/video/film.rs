@@ -26,7 +26,8 @@ impl Film {
     /// A camera that has not filmed yet.
     pub fn new(config: &CameraConfig) -> Self {
         let seed = Seed(0);
-        let camera = config.camera(Family::BlockStacking, seed);
+        // Any family's: each episode begins with its own.
+        let camera = config.camera(Family::ALL[0], seed);
         let nothing = Scene { bodies: Vec::new(), slots: Vec::new(), table_half_m: [0.0; 2] };
         let renderer = Renderer::new(config.look(&nothing, seed));
         Self { config: config.clone(), camera, renderer, encoder: None, bytes: Vec::new(), has_seen_a_body: false }

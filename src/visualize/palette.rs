@@ -59,13 +59,13 @@ pub(super) fn of_call(scene: &Scene, call: &ProgramCall) -> [u8; 3] {
 fn of_program(program: Program) -> [u8; 3] {
     match program {
         Program::None => [120, 120, 120],
-        Program::BlockStacking | Program::ObjectSorting | Program::TableCleanup => [84, 110, 168],
         Program::PickAndPlace | Program::PickAndDrop => [126, 87, 194],
         Program::Pick => [38, 150, 140],
         Program::Place | Program::Drop => [205, 133, 63],
         Program::MoveTo => [79, 165, 235],
         Program::Grip => [92, 170, 96],
         Program::Release => [214, 84, 120],
+        _root => [84, 110, 168],
     }
 }
 

@@ -231,3 +231,18 @@ fn library_code_reads_no_clock_but_for_progress_and_cpu_time() {
         assert!(!reads || name.starts_with("progress"), "{name} reads a clock");
     }
 }
+
+#[test]
+fn which_family_a_task_is_of_is_asked_in_the_families_own_files_alone() {
+    let mut wrong = Vec::new();
+    for (name, text) in source_files() {
+        if name == "program.rs" || name == "task/family.rs" || name.starts_with("task/family/") {
+            continue;
+        }
+        for family in ntp::task::Family::ALL {
+            let names = [format!("Family::{family:?}"), format!("Program::{:?}", family.root_program())];
+            wrong.extend(names.iter().filter(|word| text.contains(*word)).map(|word| format!("{name} names {word}")));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}

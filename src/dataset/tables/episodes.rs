@@ -19,7 +19,7 @@ table! {
         task_id: Text,
         /// the task in words
         task_text: Text,
-        /// `block_stacking`, `object_sorting` or `table_cleanup`
+        /// the kind of task, e.g. `block_stacking`
         family: Text,
         /// `seen` or `unseen`; one for all episodes of a task
         split: Text,

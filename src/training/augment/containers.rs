@@ -9,28 +9,27 @@ use std::ops::Range;
 use rand::Rng;
 
 use crate::scene::SlotIndex;
-use crate::task::{CONTAINER_HALF_M, Family};
+use crate::task::Family;
 use crate::training::augment::Views;
 
 /// For each container the one that takes over what is brought there; often itself.
 pub(super) struct Merge {
     containers: Range<usize>,
+    /// Half of a container's outer width and depth.
+    half_m: f32,
     taken_over_by: Vec<usize>,
 }
 
 impl Merge {
-    /// Draws which containers take over from which. Nothing for a family without containers.
-    pub(super) fn draw(family: Family, n_slots: usize, rng: &mut impl Rng) -> Option<Self> {
-        let containers = match family {
-            Family::ObjectSorting => n_slots / 2..n_slots,
-            Family::BlockStacking | Family::TableCleanup => return None,
-        };
+    /// Draws which containers take over from which. Nothing for a family whose containers take the things of one sub-task each.
+    pub(super) fn draw(family: Family, rng: &mut impl Rng) -> Option<Self> {
+        let (containers, half_m) = family.shared_containers()?;
         let mut draw = |slot: usize| {
             let other = rng.random_range(containers.clone());
             if rng.random::<bool>() { other } else { slot }
         };
         let taken_over_by = containers.clone().map(&mut draw).collect();
-        Some(Self { containers, taken_over_by })
+        Some(Self { containers, half_m, taken_over_by })
     }
 
     /// Changes what is seen, and which container is meant.
@@ -64,7 +63,7 @@ impl Merge {
     /// How far what lies at a place goes: from the container that it lies in or above to the one that takes over.
     fn shift(&self, positions: &[f32], place: [f32; 2]) -> [f32; 3] {
         let at = |slot: usize| -> [f32; 3] { std::array::from_fn(|axis| positions[3 * slot + axis]) };
-        let is_over = |slot: &usize| (0..2).all(|axis| (at(*slot)[axis] - place[axis]).abs() <= CONTAINER_HALF_M);
+        let is_over = |slot: &usize| (0..2).all(|axis| (at(*slot)[axis] - place[axis]).abs() <= self.half_m);
         let Some(slot) = self.containers.clone().find(is_over) else { return [0.0; 3] };
         let other = self.taken_over_by[slot - self.containers.start];
         std::array::from_fn(|axis| at(other)[axis] - at(slot)[axis])
@@ -82,7 +81,7 @@ mod tests {
     /// Two categories and two containers; the second takes over from the first, above which the gripper hangs.
     #[test]
     fn gripper_and_content_go_along_to_the_container_that_takes_over() {
-        let merge = Merge { containers: 2..4, taken_over_by: vec![3, 3] };
+        let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
         let mut seen = [0.03, 0.02, -0.28, -0.1, -0.4, -0.28, 0.0, 0.0, -0.3, 0.26, 0.0, -0.3];
         merge.apply_to_row(&mut seen);
         assert_eq!(rounded(&seen), [3, 2, -28, -36, -40, -28, -26, 0, -30, 0, 0, -30]);
@@ -92,7 +91,7 @@ mod tests {
 
     #[test]
     fn content_goes_alone_where_the_gripper_hangs_elsewhere() {
-        let merge = Merge { containers: 2..4, taken_over_by: vec![3, 3] };
+        let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
         let mut seen = [0.53, 0.02, -0.28, 0.7, 0.1, -0.28, 0.5, 0.0, -0.3, 0.76, 0.0, -0.3];
         merge.apply_to_row(&mut seen);
         assert_eq!(rounded(&seen), [79, 2, -28, 70, 10, -28, 50, 0, -30, 76, 0, -30], "what lay in the other stays");

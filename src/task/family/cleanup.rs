@@ -1,23 +1,64 @@
-//! The table of Table Clean-up: four bowls, forks and a tray.
+//! Table Clean-up: bowls are stacked on a tray in some order, the forks put into the last, and the tray carried away.
 //!
 //! Bowls that a task does not ask for stand aside, where nothing reaches them, so that every scene has the same slots.
+//!
+//! # Source
+//!
+//! Paper, experiment 3: "up to 4 bowls", "the ordering in which bowls are stacked can vary". There are 64 orders of one
+//! to four bowls. [`UNSEEN`] of each length are held out, so that every length is measured on orders never seen.
 
+use rand::Rng as _;
 use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
 
 use crate::geometry::{Pose, Vec3, upright};
+use crate::program::Program;
 use crate::scene::{Body, BodyIndex, Bowl, Mobility, Scene, Shape, Slot, SlotIndex};
+use crate::seed::Seed;
+use crate::task::family::spec::{Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
+use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
+
+pub(super) static SPEC: FamilySpec = FamilySpec {
+    name: "table_cleanup",
+    short_name: "cleanup",
+    title: "Table Clean-up",
+    root: Program::TableCleanup,
+    kinds: &[
+        SlotKind {
+            name: "bowl",
+            slots: &BOWL_NAMES,
+            brings_about: Some(Condition::on_top),
+            room: Room::One,
+            bodies: Bodies::OneIfAsked,
+        },
+        SlotKind {
+            name: "fork",
+            slots: &["fork"],
+            brings_about: Some(Condition::inside),
+            room: Room::Nothing,
+            bodies: Bodies::Many { most: MAX_FORKS },
+        },
+        SlotKind { name: "tray", slots: &["tray"], brings_about: None, room: Room::One, bodies: Bodies::One },
+    ],
+    builds_towers: false,
+    tray: Some(TRAY),
+    imported_as: None,
+    front_view: FrontView { eye_m: [0.0, -1.40, 1.62], target_m: [0.0, 0.04, 0.02] },
+    sampler: Sampler { limits: |_pool, _train| (N_TRAINING, N_UNSEEN), all_seen: None, sample },
+    scene,
+    poses,
+};
 
 /// How many bowls there are, asked for or not.
-pub(in crate::task) const N_BOWLS: u16 = 4;
+const N_BOWLS: u16 = 4;
 /// The slot of the forks.
-pub(in crate::task) const FORK: SlotIndex = SlotIndex(N_BOWLS);
+const FORK: SlotIndex = SlotIndex(N_BOWLS);
 /// The slot of the tray.
-pub(in crate::task) const TRAY: SlotIndex = SlotIndex(N_BOWLS + 1);
+const TRAY: SlotIndex = SlotIndex(N_BOWLS + 1);
 /// The most forks: as many as a bowl holds.
-pub(in crate::task) const MAX_FORKS: u16 = 20;
+const MAX_FORKS: u16 = 20;
 
-/// The names of the slots.
-pub(super) const SLOT_NAMES: [&str; 6] = ["bowl_1", "bowl_2", "bowl_3", "bowl_4", "fork", "tray"];
+const BOWL_NAMES: [&str; N_BOWLS as usize] = ["bowl_1", "bowl_2", "bowl_3", "bowl_4"];
 
 /// Nested walls stay 6.5 mm apart, more than a placing is off.
 const BOWL: Bowl = Bowl {
@@ -55,10 +96,10 @@ const ASIDE_X_M: f32 = 0.8;
 const ASIDE_PITCH_M: f32 = 0.2;
 
 /// The scene for 1 or 0 of each bowl (1 when it is asked for) and a number of forks; what is left out is 1.
-pub(super) fn scene(counts: &[u16]) -> Scene {
+fn scene(counts: &[u16]) -> Scene {
     let count = |slot: SlotIndex| counts.get(usize::from(slot.0)).copied().unwrap_or(1);
     let bowl = |index: u16| Body {
-        name: SLOT_NAMES[usize::from(index)].to_owned(),
+        name: BOWL_NAMES[usize::from(index)].to_owned(),
         shape: Shape::Bowl(BOWL),
         mobility: if count(SlotIndex(index)) > 0 { Mobility::Movable } else { Mobility::Fixed },
         color: BOWL_COLORS[usize::from(index)],
@@ -84,13 +125,13 @@ pub(super) fn scene(counts: &[u16]) -> Scene {
     let bodies_of_slots = (0..N_BOWLS).map(|bowl| bowl..bowl + 1).chain([N_BOWLS..end, end..end + 1]);
     Scene {
         bodies: (0..N_BOWLS).map(bowl).chain((0..n_forks).map(fork)).chain([tray]).collect(),
-        slots: SLOT_NAMES.into_iter().zip(bodies_of_slots).map(slot).collect(),
+        slots: BOWL_NAMES.into_iter().chain(["fork", "tray"]).zip(bodies_of_slots).map(slot).collect(),
         table_half_m: TABLE_HALF_M,
     }
 }
 
 /// Random poses: bowls in cells of their own, forks four in a cell, the tray behind them.
-pub(super) fn poses(scene: &Scene, rng: &mut impl rand::Rng) -> Vec<Pose> {
+fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
     let [columns, rows] = CELLS;
     let mut cells: Vec<[f32; 2]> =
         (0..columns * rows).map(|cell| cell_middle([cell % columns, cell / columns])).collect();
@@ -130,8 +171,52 @@ fn cell_middle([column, row]: [usize; 2]) -> [f32; 2] {
     [middle(column, CELLS[0]), middle(row, CELLS[1]) + CELLS_CENTER_Y_M]
 }
 
-fn scattered([x, y]: [f32; 2], z: f32, jitter_m: f32, turn_rad: f32, rng: &mut impl rand::Rng) -> Pose {
+fn scattered([x, y]: [f32; 2], z: f32, jitter_m: f32, turn_rad: f32, rng: &mut ChaCha8Rng) -> Pose {
     let mut jitter = || rng.random_range(-jitter_m..jitter_m);
     let position = Vec3::new(x + jitter(), y + jitter(), z);
     upright(position, rng.random_range(-turn_rad..turn_rad))
+}
+
+/// How many orders of one, two, three and four bowls are held out.
+const UNSEEN: [usize; N_BOWLS as usize] = [2, 4, 8, 10];
+/// How many orders may be trained on.
+const N_TRAINING: u32 = 40;
+/// How many orders are held out.
+const N_UNSEEN: u32 = 24;
+
+/// Training tasks, then unseen ones.
+fn sample(_pool: TaskPool, train: usize, unseen: usize, seed: Seed) -> Vec<Task> {
+    let mut seen_orders = Vec::new();
+    let mut unseen_orders = Vec::new();
+    for (length, n_unseen) in (1..).zip(UNSEEN) {
+        let mut orders = orders(length);
+        orders.shuffle(&mut seed.derive("cleanup_orders", &[length as u64]).rng());
+        seen_orders.extend(orders.split_off(n_unseen));
+        unseen_orders.extend(orders);
+    }
+    seen_orders.shuffle(&mut seed.derive("cleanup_seen", &[]).rng());
+    unseen_orders.shuffle(&mut seed.derive("cleanup_unseen", &[]).rng());
+    let seen = seen_orders.iter().take(train).map(|order| order_task(order, Split::Seen));
+    seen.chain(unseen_orders.iter().take(unseen).map(|order| order_task(order, Split::Unseen))).collect()
+}
+
+/// Every order of so many bowls.
+fn orders(length: usize) -> Vec<Vec<u16>> {
+    if length == 0 {
+        return vec![Vec::new()];
+    }
+    let longer = |order: Vec<u16>| {
+        let others = (0..N_BOWLS).filter(|bowl| !order.contains(bowl)).collect::<Vec<_>>();
+        others.into_iter().map(move |bowl| [order.as_slice(), &[bowl]].concat())
+    };
+    orders(length - 1).into_iter().flat_map(longer).collect()
+}
+
+/// The id names the order from below: `clean_31` puts `bowl_3` on the tray, `bowl_1` into it, and the forks into that.
+fn order_task(order: &[u16], split: Split) -> Task {
+    let bowls = order.iter().copied().map(SlotIndex);
+    let below = std::iter::once(TRAY).chain(bowls.clone());
+    let goals = bowls.chain([FORK]).zip(below).map(|(source, target)| Goal { source, target }).collect();
+    let digits: String = order.iter().map(|bowl| (bowl + 1).to_string()).collect();
+    Task::of_goals(format!("clean_{digits}"), Family::TableCleanup, goals, split)
 }
