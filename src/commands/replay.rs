@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::artifact::{Plan, StageDir};
@@ -10,7 +11,7 @@ use crate::cli::ReplayArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::{Playback, play_back};
-use crate::pipeline::{self, Verification};
+use crate::pipeline::{self, PipelineError, Verification};
 use crate::recording::{self, ShardReader};
 use crate::render::CameraConfig;
 use crate::rollout::{Divergence, RolloutRows};
@@ -85,19 +86,27 @@ fn run_dataset(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
 }
 
 fn verify(args: &ReplayArgs, found: &[Found]) -> anyhow::Result<CommandOutcome> {
-    let mut outcome = CommandOutcome::Done;
-    for found in found {
-        let verification = pipeline::verify(&found.plan, &found.episode)?;
-        if args.json {
-            output::print_json(&verification)?;
-        } else {
-            output::print(&verification.to_string())?;
-        }
-        if !matches!(verification, Verification::Same { .. }) {
-            outcome = CommandOutcome::CheckFailed;
-        }
+    let verified = |of: &Found| Ok::<_, PipelineError>((of.number, pipeline::verify(&of.plan, &of.episode)?));
+    let verified = found.iter().map(verified).collect::<Result<Vec<_>, _>>()?;
+    if args.json {
+        let episodes =
+            verified.iter().map(|(episode, verification)| VerifiedEpisode { episode: *episode, verification });
+        output::print_json(&json!({ "episodes": episodes.collect::<Vec<_>>() }))?;
+    } else {
+        let line = |(episode, verification): &(u64, Verification)| format!("episode {episode} {verification}");
+        output::print(&verified.iter().map(line).collect::<Vec<_>>().join("\n"))?;
     }
-    Ok(outcome)
+    let all_same = verified.iter().all(|(_, verification)| matches!(verification, Verification::Same { .. }));
+    Ok(if all_same { CommandOutcome::Done } else { CommandOutcome::CheckFailed })
+}
+
+/// What simulating an episode again has shown.
+#[derive(Serialize)]
+struct VerifiedEpisode<'v> {
+    /// Its number.
+    episode: u64,
+    #[serde(flatten)]
+    verification: &'v Verification,
 }
 
 impl Found {

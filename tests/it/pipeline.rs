@@ -209,6 +209,14 @@ fn an_episode_simulated_again_is_the_same_in_every_frame() {
         assert_eq!(code, 0, "{part}: {stdout} {stderr}");
         assert!(stdout.contains("are the same"), "{stdout}");
     }
+    let recorded = folder.path().join("recordings");
+    let (code, stdout, _) = run(&["replay", &recorded.to_string_lossy(), "--episode", "0,2", "--verify", "--json"]);
+    let verified: serde_json::Value = serde_json::from_str(&stdout).expect("one document, however many episodes");
+    let told = |episode: &serde_json::Value| {
+        (episode["episode"].as_u64().unwrap(), episode["result"].as_str().unwrap().to_owned())
+    };
+    let told: Vec<_> = verified["episodes"].as_array().unwrap().iter().map(told).collect();
+    assert_eq!((code, told), (0, vec![(0, "same".to_owned()), (2, "same".to_owned())]));
 }
 
 #[test]
