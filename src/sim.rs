@@ -206,7 +206,7 @@ impl RobotApi for Simulation {
     }
 
     /// See [`Action`]. To grip while holding and to release with nothing held (it opens the fingers) succeed and move
-    /// nothing; to move to a slot that the scene does not have fails with [`Cause::TimeLimit`].
+    /// nothing; to move to a slot that the scene does not have fails with [`Cause::UnknownSlot`].
     fn act(&mut self, action: Action) -> Result<(), Cause> {
         let before_nanos = self.clock.time_nanos();
         let held_before = self.gripper.held.map(|held| held.body);

@@ -29,6 +29,7 @@ pub use instruction::{
 pub use outcome::{Cause, Outcome};
 pub use push::Push;
 pub use recorder::{CallRecorder, NewCall};
+pub(crate) use rules::check_argument;
 pub use rules::{CallProblem, PushProblem, TraceError, check_calls};
 pub use span::{ScopingLabel, Span};
 pub use specification::SpecificationForm;

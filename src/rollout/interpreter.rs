@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::task::Task;
 use crate::trace::{
     CallRecorder, Cause, Episode, EpisodeParts, Frame, NewCall, Outcome, Provenance, Push, SpecificationForm,
-    TraceError,
+    TraceError, check_argument,
 };
 
 /// An episode about to be acted: a demonstration, and a world of another trial.
@@ -125,6 +125,8 @@ struct Running<'t> {
     /// What first went wrong in physics, at which decision.
     first_fault: Option<(u32, Cause)>,
     gave_up: bool,
+    /// The decision that no call can be made of, if there was one.
+    unlawful: Option<TraceError>,
 }
 
 impl<'t> Running<'t> {
@@ -155,12 +157,13 @@ impl<'t> Running<'t> {
             first_divergence: None,
             first_fault: None,
             gave_up: false,
+            unlawful: None,
         }
     }
 
     /// What to ask the policy now; nothing when the episode is over.
     fn query(&self, episode: usize) -> Option<Query> {
-        let top = self.calls.top().filter(|_| !self.gave_up)?;
+        let top = self.calls.top().filter(|_| !self.gave_up && self.unlawful.is_none())?;
         Some(Query {
             episode,
             decision: self.decisions,
@@ -180,6 +183,10 @@ impl<'t> Running<'t> {
         let caller = self.calls.top().map_or(Program::None, |top| top.program);
         let number = self.decisions;
         let Decision { program, scope, argument, end_of_program, prediction } = decision;
+        if let Err(problem) = check_argument(self.world.scene().slots.len(), program, argument) {
+            self.unlawful = Some(TraceError::Call { call: self.calls.len() as u32, problem });
+            return;
+        }
         let scope = (program != Program::None).then_some(scope);
         let new = NewCall { program, argument, scope, end_of_program, prediction };
         self.calls.call(new, self.frame());
@@ -222,6 +229,9 @@ impl<'t> Running<'t> {
     }
 
     fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
+        if let Some(unlawful) = self.unlawful {
+            return Err(unlawful);
+        }
         let judgement = judge(self.task, self.world.as_mut());
         let cause = if self.gave_up { Some(Cause::NeverEnded) } else { judgement.cause };
         let first_cause = |cause| self.first_fault.map_or(cause, |(_, fault)| fault);

@@ -55,7 +55,7 @@ impl Simulation {
 
     fn move_to(&mut self, slot: SlotIndex) -> Result<(), Cause> {
         let Some(&body) = self.locked().get(usize::from(slot.0)) else {
-            return Err(Cause::TimeLimit);
+            return Err(Cause::UnknownSlot);
         };
         let target = self.body_in_world(body).translation;
         let hover_z = target.z + self.scene.body(body).shape.rim_m().unwrap_or(0.0) + HOVER_M;

@@ -27,6 +27,8 @@ pub enum Cause {
     PushedOffTable,
     /// The held body was lost on the way.
     DroppedObject,
+    /// The action names a slot that the scene does not have.
+    UnknownSlot,
     /// A motion did not come to its end in time.
     TimeLimit,
     /// The actor ended its root program although the goal did not hold.
@@ -39,12 +41,13 @@ pub enum Cause {
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::MissedGrasp,
         Self::KnockedTower,
         Self::ObjectOffTable,
         Self::PushedOffTable,
         Self::DroppedObject,
+        Self::UnknownSlot,
         Self::TimeLimit,
         Self::EndedEarly,
         Self::NeverEnded,
@@ -59,6 +62,7 @@ impl Cause {
             Self::ObjectOffTable => "object_off_table",
             Self::PushedOffTable => "pushed_off_table",
             Self::DroppedObject => "dropped_object",
+            Self::UnknownSlot => "unknown_slot",
             Self::TimeLimit => "time_limit",
             Self::EndedEarly => "ended_early",
             Self::NeverEnded => "never_ended",

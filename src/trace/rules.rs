@@ -87,6 +87,8 @@ pub enum CallProblem {
     SiblingOverlap { begin: u32, sibling: u32 },
     #[error("{program} and argument {argument:?} do not go together")]
     Argument { program: Program, argument: Option<SlotIndex> },
+    #[error("its argument is slot {slot}, but the scene has {slots}, counted from 0")]
+    UnknownSlot { slot: u16, slots: usize },
     #[error("the composite {program} returned without ending")]
     NotEnded { program: Program },
 }
@@ -300,9 +302,16 @@ fn check_alone(n_slots: usize, position: usize, call: &ProgramCall) -> Result<()
     if let Some(output) = output.filter(|&output| !input.contains(output)) {
         return Err(CallProblem::OutputOutsideInput { input: *input, output });
     }
-    let in_scene = argument.is_none_or(|slot| usize::from(slot.0) < n_slots);
-    if argument.is_some() != program.takes_argument() || !in_scene {
-        return Err(CallProblem::Argument { program: *program, argument: *argument });
+    check_argument(n_slots, *program, *argument)
+}
+
+/// Whether a call of a program has the argument that it needs, in a scene of so many slots.
+pub(crate) fn check_argument(n_slots: usize, program: Program, argument: Option<SlotIndex>) -> Result<(), CallProblem> {
+    if argument.is_some() != program.takes_argument() {
+        return Err(CallProblem::Argument { program, argument });
     }
-    Ok(())
+    match argument.filter(|slot| usize::from(slot.0) >= n_slots) {
+        Some(slot) => Err(CallProblem::UnknownSlot { slot: slot.0, slots: n_slots }),
+        None => Ok(()),
+    }
 }

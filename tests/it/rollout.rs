@@ -1,6 +1,7 @@
 //! The interpreter, driven by the oracle.
 
 use ntp::model::Decisions;
+use ntp::program::Program;
 use ntp::robot::{Action, RobotApi};
 use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, run};
 use ntp::scene::{BodyIndex, Scene, SceneState, SlotIndex};
@@ -197,4 +198,32 @@ fn primitives_called_by_the_root_do_what_the_hierarchy_does() {
     assert_eq!(rollout.episode.outcome, Outcome::Success);
     assert_eq!((rollout.decisions, rollout.first_divergence), (2 * 4 + 1, None));
     assert!(rollout.episode.calls.iter().skip(1).all(|call| call.depth == 1));
+}
+
+/// Answers every question with one program and argument.
+struct Stubborn(Program, Option<SlotIndex>);
+
+impl Policy for Stubborn {
+    fn name(&self) -> &str {
+        "stubborn"
+    }
+    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+        let Self(program, argument) = *self;
+        let decision = |query: &Query| Decision { program, argument, end_of_program: false, ..Decision::end(query) };
+        queries.iter().map(decision).collect()
+    }
+}
+
+#[test]
+fn a_decision_that_is_no_call_is_an_error_that_names_it() {
+    let task = tower("t", &[0, 1], Split::Unseen);
+    let error = |program, argument| {
+        let rollouts = run(&mut Stubborn(program, argument), vec![start(&task, 1, 1)], Limits::default());
+        rollouts.unwrap_err().to_string()
+    };
+    let unknown = error(Program::MoveTo, Some(SlotIndex(8)));
+    assert_eq!(unknown, "call 1: its argument is slot 8, but the scene has 8, counted from 0");
+    assert_eq!(error(Program::MoveTo, None), "call 1: move_to and argument None do not go together");
+    let superfluous = error(Program::Grip, Some(SlotIndex(0)));
+    assert_eq!(superfluous, "call 1: grip and argument Some(SlotIndex(0)) do not go together");
 }

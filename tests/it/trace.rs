@@ -157,7 +157,7 @@ fn leaves_are_primitives_with_their_arguments() {
     );
     check_call_refused(
         |parts| parts.calls[3].argument = Some(SlotIndex(8)),
-        |problem| matches!(problem, CallProblem::Argument { .. }),
+        |problem| matches!(problem, CallProblem::UnknownSlot { slot: 8, slots: 8 }),
     );
     check_call_refused(
         |parts| parts.calls[4].argument = Some(SlotIndex(0)),

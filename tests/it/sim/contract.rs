@@ -5,7 +5,7 @@ use ntp::scene::{BodyIndex, SlotIndex, locked_bodies};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, initial_state, scene};
-use ntp::trace::Frame;
+use ntp::trace::{Cause, Frame};
 use rand::Rng as _;
 
 use super::table::pick_and_place;
@@ -106,10 +106,10 @@ fn to_grip_twice_and_to_release_nothing_change_nothing() {
 }
 
 #[test]
-fn a_slot_that_is_not_there_is_no_panic() {
+fn a_slot_that_is_not_there_is_told_as_that() {
     let mut world = world(Family::BlockStacking, &[], Seed(6), &SimulationConfig::default());
     let before = world.state();
-    assert!(world.act(Action::MoveTo(SlotIndex(99))).is_err());
+    assert_eq!(world.act(Action::MoveTo(SlotIndex(99))), Err(Cause::UnknownSlot));
     assert_eq!(world.state(), before);
     assert_eq!(world.frames().len(), 2);
 }
