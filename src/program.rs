@@ -39,11 +39,13 @@ pub enum Program {
     Release,
     /// Root of Table Clean-up.
     TableCleanup,
+    /// Root of Kitting.
+    Kitting,
 }
 
 impl Program {
     /// Every program, in the order of the program memory.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::None,
         Self::BlockStacking,
         Self::ObjectSorting,
@@ -56,6 +58,7 @@ impl Program {
         Self::Grip,
         Self::Release,
         Self::TableCleanup,
+        Self::Kitting,
     ];
 
     /// The name in files and messages.
@@ -73,6 +76,7 @@ impl Program {
             Self::Grip => "grip",
             Self::Release => "release",
             Self::TableCleanup => "table_cleanup",
+            Self::Kitting => "kitting",
         }
     }
 
@@ -103,6 +107,7 @@ impl Program {
             | Self::BlockStacking
             | Self::ObjectSorting
             | Self::TableCleanup
+            | Self::Kitting
             | Self::Grip
             | Self::Release => 0,
             Self::Pick | Self::Place | Self::Drop | Self::MoveTo => 1,

@@ -4,6 +4,7 @@
 //! which family it has before it: it asks for what the [`FamilySpec`] declares.
 
 mod cleanup;
+mod kitting;
 mod sorting;
 mod spec;
 mod stacking;
@@ -50,6 +51,8 @@ families! {
     ObjectSorting => sorting,
     /// Bowls are stacked on a tray and forks put into the topmost; the tray is carried away.
     TableCleanup => cleanup,
+    /// Parts are put on the marked places of trays, as a kit asks for; some parts are alike.
+    Kitting => kitting,
 }
 
 impl Family {

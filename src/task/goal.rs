@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Vec3, horizontal_distance};
 use crate::program::Program;
-use crate::scene::{Scene, SceneState, SlotIndex, lies_inside};
+use crate::scene::{BodyIndex, Mobility, Scene, SceneState, SlotIndex, lies_inside};
 use crate::task::Family;
 
 /// One sub-task: bring what `source` shows onto or into what `target` shows. Task files tell slots by their names.
@@ -53,6 +53,13 @@ pub enum Condition<S = SlotIndex> {
         /// The container.
         container: S,
     },
+    /// A part, or one that looks the same, lies on a place, and nothing else does.
+    Filled {
+        /// The part; of those that look the same the first.
+        part: S,
+        /// The place.
+        place: S,
+    },
 }
 
 /// The programs that bring a condition about.
@@ -80,7 +87,9 @@ impl<S> Condition<S> {
     /// The programs that bring it about.
     pub fn sub_task(&self) -> SubTask {
         match self {
-            Self::OnTop { .. } => SubTask { program: Program::PickAndPlace, put: Program::Place, for_each: false },
+            Self::OnTop { .. } | Self::Filled { .. } => {
+                SubTask { program: Program::PickAndPlace, put: Program::Place, for_each: false }
+            }
             Self::Inside { .. } => SubTask { program: Program::PickAndDrop, put: Program::Drop, for_each: true },
         }
     }
@@ -88,7 +97,7 @@ impl<S> Condition<S> {
     /// Bringing it about, in words.
     pub(super) fn in_words(&self, source: &str, target: &str) -> String {
         match self {
-            Self::OnTop { .. } => format!("put {source} on {target}"),
+            Self::OnTop { .. } | Self::Filled { .. } => format!("put {source} on {target}"),
             Self::Inside { .. } => format!("put every {source} into {target}"),
         }
     }
@@ -104,6 +113,9 @@ impl<S> Condition<S> {
             }
             Self::Inside { category, container } => {
                 Condition::Inside { category: tell("category", category)?, container: tell("container", container)? }
+            }
+            Self::Filled { part, place } => {
+                Condition::Filled { part: tell("part", part)?, place: tell("place", place)? }
             }
         })
     }
@@ -127,6 +139,19 @@ pub fn rests_on(above: &Vec3, below: &Vec3, height_m: f32) -> bool {
         && (above.z - below.z - height_m).abs() <= MAX_STACK_HEIGHT_ERROR_M
 }
 
+/// Whether a body that can be moved lies on a flat one, with its centre above the other's upper side.
+fn lies_on(scene: &Scene, state: &SceneState, body: BodyIndex, below: BodyIndex) -> bool {
+    let (upper, lower) = (scene.body(body), scene.body(below));
+    let center = state.body_in_world(body).translation.vector;
+    let on_lower = state.body_in_world(below).inverse_transform_point(&center.into()).coords;
+    let half = lower.shape.half_extents_m();
+    let height_m = upper.shape.foot_m() + lower.shape.seat_m();
+    upper.mobility == Mobility::Movable
+        && on_lower.x.abs() <= half.x
+        && on_lower.y.abs() <= half.y
+        && (on_lower.z - height_m).abs() <= MAX_STACK_HEIGHT_ERROR_M
+}
+
 /// Whether one condition holds.
 pub fn condition_holds(scene: &Scene, state: &SceneState, condition: &Condition) -> bool {
     let bodies = |slot: SlotIndex| scene.slot(slot).bodies.iter().copied();
@@ -139,6 +164,13 @@ pub fn condition_holds(scene: &Scene, state: &SceneState, condition: &Condition)
         }),
         Condition::Inside { category, container } => bodies(container).all(|container| {
             bodies(category).all(|body| lies_inside(scene, state, body, container) && state.held != Some(body))
+        }),
+        Condition::Filled { part, place } => bodies(part).zip(bodies(place)).all(|(part, place)| {
+            let lying: Vec<BodyIndex> =
+                scene.body_indices().filter(|&body| lies_on(scene, state, body, place)).collect();
+            let [only] = lying[..] else { return false };
+            let (found, wanted) = (scene.body(only), scene.body(part));
+            found.shape == wanted.shape && found.color == wanted.color && state.held != Some(only)
         }),
     }
 }

@@ -33,6 +33,8 @@ mod kill;
 #[cfg(test)]
 mod kinematic;
 #[cfg(test)]
+mod kitting;
+#[cfg(test)]
 mod length;
 #[cfg(test)]
 mod lerobot;

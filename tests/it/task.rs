@@ -426,7 +426,7 @@ fn two_thousand_tasks_in_the_authors_form_come_back_as_they_were_split_at_a_thou
             .map(|goal| json!({"name": "pick_place", "src": cube(goal.source), "target": cube(goal.target)}));
         let ends = task.conditions.iter().map(|condition| match *condition {
             Condition::OnTop { upper, lower } => json!({"type": "on_top", "src": cube(upper), "target": cube(lower)}),
-            Condition::Inside { .. } => panic!("blocks lie in nothing"),
+            Condition::Inside { .. } | Condition::Filled { .. } => panic!("blocks lie in nothing"),
         });
         json!({"id": task.id, "goals": goals.collect::<Vec<_>>(), "end_constraints": ends.collect::<Vec<_>>()})
     };
