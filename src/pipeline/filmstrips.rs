@@ -1,5 +1,5 @@
-//! Filmstrips for the report, drawn from what was recorded: a demonstration, the success that it led to, and each
-//! suite's first failures.
+//! Filmstrips for the report, drawn from what was recorded: the first demonstration, the first success, and each suite's
+//! first failures.
 
 use std::path::PathBuf;
 
@@ -50,19 +50,20 @@ pub(super) fn of_experiment(
     tasks: &TaskSet,
     rollouts: &[Rollouts],
 ) -> Result<Vec<Filmstrip>, PipelineError> {
-    let mut strips = Strips { experiment, tasks, success: Vec::new(), failures: Vec::new() };
+    let mut strips = Strips { experiment, tasks, demonstration: None, success: None, failures: Vec::new() };
     for of in rollouts {
         strips.search(of)?;
     }
-    Ok(strips.success.into_iter().chain(strips.failures).collect())
+    let Strips { demonstration, success, failures, .. } = strips;
+    Ok(demonstration.into_iter().chain(success).chain(failures).collect())
 }
 
 /// Strips as they are found.
 struct Strips<'a> {
     experiment: &'a str,
     tasks: &'a TaskSet,
-    /// The demonstration and the success.
-    success: Vec<Filmstrip>,
+    demonstration: Option<Filmstrip>,
+    success: Option<Filmstrip>,
     failures: Vec<Filmstrip>,
 }
 
@@ -77,7 +78,7 @@ impl Strips<'_> {
         let mut position = 0;
         for file in recordings {
             for episode in ShardReader::open(&file)? {
-                if !(self.lacks_success() || has_failures && self.lacks_failures(&of.suite)) {
+                if !(self.success.is_none() || has_failures && self.lacks_failures(&of.suite)) {
                     return Ok(());
                 }
                 let episode = episode?;
@@ -89,10 +90,6 @@ impl Strips<'_> {
         Ok(())
     }
 
-    fn lacks_success(&self) -> bool {
-        self.success.is_empty()
-    }
-
     fn lacks_failures(&self, suite: &str) -> bool {
         let own = self.failures.iter().filter(|strip| strip.suite == suite).count();
         own < MOST_FAILURES && self.failures.len() < MOST_FAILURES_IN_ALL
@@ -100,14 +97,15 @@ impl Strips<'_> {
 
     fn add(&mut self, of: &Rollouts, found: &Found) -> Result<(), PipelineError> {
         let is_success = found.episode.outcome.is_success();
-        if is_success && self.lacks_success() {
-            if let Some(plan) = of.dir.plan()?
-                && let Some(episode) = demonstration_of(&plan, self.tasks, &found.episode)?
-            {
-                let shown = Found { episode, position: found.position, divergence: None };
-                self.success.push(self.strip(of, Shows::Demonstration, &shown)?);
-            }
-            self.success.push(self.strip(of, Shows::Success, found)?);
+        if self.demonstration.is_none()
+            && let Some(plan) = of.dir.plan()?
+            && let Some(episode) = demonstration_of(&plan, self.tasks, &found.episode)?
+        {
+            let shown = Found { episode, position: found.position, divergence: None };
+            self.demonstration = Some(self.strip(of, Shows::Demonstration, &shown)?);
+        }
+        if is_success && self.success.is_none() {
+            self.success = Some(self.strip(of, Shows::Success, found)?);
         } else if !is_success && self.lacks_failures(&of.suite) {
             self.failures.push(self.strip(of, Shows::Failure, found)?);
         }

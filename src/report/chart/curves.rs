@@ -128,6 +128,10 @@ fn path(points: &[CurvePoint], part: usize, axes: &Axes) -> String {
         let x = coordinate(PANEL.x(point.step as f64 / axes.last_step));
         let y = coordinate(axes.y(loss.max(f64::MIN_POSITIVE).log10()));
         path.push_str(&format!("{pen}{x} {y}"));
+        if pen == 'M' {
+            // A point that stays alone is a dot.
+            path.push_str("h0");
+        }
         pen = 'L';
     }
     path
