@@ -282,6 +282,10 @@ impl Check<'_> {
                 Some((verdict, tell(rows.iter().copied())))
             }
             Self::Within(most, a, b) => {
+                // That neither ever succeeds is not what the paper tells of.
+                if a.successes + b.successes == 0 {
+                    return None;
+                }
                 let apart = (a.mean_success_rate - b.mean_success_rate).abs();
                 let verdict = if apart <= *most { Verdict::Reproduced } else { Verdict::NotReproduced };
                 Some((verdict, tell([*a, *b].into_iter())))
