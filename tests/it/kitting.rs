@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use ntp::expert::demonstrate;
 use ntp::geometry::{Vec3, horizontal_distance, upright};
+use ntp::program::{KnownPrograms, Program};
+use ntp::recording::{ShardWriter, inspect};
 use ntp::rollout::{Limits, Oracle, Start, run};
 use ntp::scene::{BodyIndex, Scene, SceneState, SlotIndex};
 use ntp::seed::Seed;
@@ -12,7 +14,7 @@ use ntp::task::{Condition, Family, Goal, Split, Task, TaskSet, Trial, condition_
 use ntp::trace::{Actor, Outcome, Provenance};
 use proptest::prelude::*;
 
-use crate::kinematic::{KinematicWorld, demonstration, trial};
+use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
 
 const PARTS: std::ops::Range<u16> = 0..6;
 const PLACES: std::ops::Range<u16> = 6..12;
@@ -182,5 +184,22 @@ fn the_expert_fills_kits_in_physics() {
         let provenance = Provenance::new(task, &trial, Actor::Expert, index as u64);
         let episode = demonstrate(task, &mut world, provenance).unwrap();
         assert_eq!(episode.outcome, Outcome::Success, "{}", task.id);
+    }
+}
+
+/// Twelve programs were known before there were kits; recordings of other families still tell of these alone.
+#[test]
+fn recordings_declare_the_programs_that_their_family_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    for (task, n_programs) in [(tower("t", &[0, 1], Split::Seen), 12), (kit(&[(0, 6)]), 13)] {
+        let path = folder.path().join(format!("{n_programs}.mcap"));
+        let mut writer = ShardWriter::create(&path, "{}").unwrap();
+        writer.write(&demonstration(&task, &trial(&task, 0, 1), 0)).unwrap();
+        writer.finish().unwrap();
+        let known = KnownPrograms::of_hash(&inspect(&path).unwrap().vocabulary_hash).unwrap();
+        assert_eq!(known.programs(), &Program::ALL[..n_programs]);
+        let bytes = std::fs::read(&path).unwrap();
+        let declares = |word: &[u8]| bytes.windows(word.len()).any(|found| found == word);
+        assert_eq!([&b"TABLE_CLEANUP"[..], b"KITTING"].map(declares), [true, n_programs == 13]);
     }
 }
