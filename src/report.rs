@@ -10,6 +10,7 @@
 //! The same inputs give the same bytes: no clock, no host, no thread count and no order of rows shows. One input is
 //! measured: what stages took ([`ReportInputs::costs`], and each model's own). Two equal runs differ in that alone.
 
+mod actor;
 mod aggregate;
 mod chart;
 mod claims;
@@ -30,6 +31,7 @@ mod rollouts;
 mod section;
 mod summary;
 
+pub use actor::{Actor, ModelParts};
 pub use claims::{Claim, Note, Verdict};
 pub use detections::{DetectionError, DetectionsInput, InSight};
 pub use facts::SuiteFacts;
@@ -40,8 +42,7 @@ pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
 pub use rollouts::RolloutsInput;
 pub use summary::{
-    Actor, Aggregate, Divergence, Fact, FirstError, InputFile, ModelParts, ModelSummary, Report, StageCost,
-    SuiteResult, TrainingEnd,
+    Aggregate, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult, TrainingEnd,
 };
 
 use std::path::{Path, PathBuf};

@@ -12,7 +12,7 @@ pub(super) mod scale;
 
 use serde::Serialize;
 
-use crate::report::summary::{Actor, ModelParts};
+use crate::report::actor::{Actor, ModelParts};
 
 /// How many colours the style sheet has for causes and kinds, beside those for models.
 pub(super) const N_COLORS: usize = 8;

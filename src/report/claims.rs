@@ -2,16 +2,15 @@
 //!
 //! # Invariants
 //!
-//! Every verdict is computed, within one experiment. A claim that one share is above another holds when the difference is in that direction
-//! and beyond its 95 % interval, fails when it is beyond it in the other direction, and shows no difference otherwise.
-//! Intervals take rollouts as independent.
+//! Every verdict is computed, within one experiment. A claim that one share is above another holds when the difference
+//! is in that direction and beyond its 95 % interval, fails when it is beyond it in the other direction, and shows no
+//! difference otherwise. Intervals take rollouts as independent.
 //!
 //! # Source
 //!
-//! Paper, experiments 1 to 4. Variances after A. Agresti and B. Caffo, "Simple and effective confidence intervals for
-//! proportions and differences of proportions result from adding two successes and two failures", The American
-//! Statistician 54 (2000).
+//! Paper, experiments 1 to 4.
 
+mod check;
 mod pictures;
 
 pub use pictures::Note;
@@ -20,13 +19,11 @@ pub(super) use pictures::notes;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::claims::check::{Check, Judged, Term, difference, different, negated};
 use crate::report::facts::{Ask, BLOCK_STACKING, OBJECT_SORTING};
 use crate::report::figures::{USUAL_PUSH, bowls_and_forks, experiments};
 use crate::report::kind::Design;
 use crate::report::summary::Aggregate;
-
-/// The normal distribution's two-sided 95 % point.
-const Z: f64 = 1.96;
 
 /// A claim of the paper and what became of it.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -76,22 +73,6 @@ enum Tasks {
     Fewest,
 }
 
-/// A share, to be added or subtracted.
-struct Term<'a> {
-    sign: f64,
-    row: &'a Aggregate,
-}
-
-/// What is left of a claim in figures.
-enum Check<'a> {
-    /// Each sum must be above zero.
-    Above(Vec<Vec<Term<'a>>>),
-    /// Each share must be at least so high.
-    AtLeast(f64, Vec<&'a Aggregate>),
-    /// Two shares must not be further apart.
-    Within(f64, &'a Aggregate, &'a Aggregate),
-}
-
 /// Our rows of one experiment and encoder, in order of models.
 struct Ours<'a> {
     rows: &'a [&'a Aggregate],
@@ -100,7 +81,6 @@ struct Ours<'a> {
 
 /// Identifier, claim, and the figures that it takes; `None` where they were not measured.
 type Rule = (&'static str, &'static str, fn(&Ours<'_>) -> Option<Judged>);
-type Judged = (Verdict, String);
 
 const RULES: [Rule; 13] = [
     ("sorting_long_tasks", "NTP sorts 4 to 40 objects at over 90 %", |ours| {
@@ -148,7 +128,7 @@ const RULES: [Rule; 13] = [
         Check::Above(vec![gru.into_iter().chain(negated(ntp)).collect()]).judge()
     }),
     ("cleanup_grid", "NTP cleans up at 55 % to 100 %, up to 4 bowls and 20 forks", |ours| {
-        let cells = ours.most_trained(Design::NTP, |row| bowls_and_forks(row));
+        let cells = ours.most_trained(Design::NTP, bowls_and_forks);
         let reaches = cells.iter().any(|row| bowls_and_forks(row) == Some((4, 20)));
         Check::AtLeast(0.55, cells).judge().filter(|_| reaches)
     }),
@@ -252,69 +232,4 @@ fn is_usual(row: &Aggregate) -> bool {
 fn length(row: &Aggregate) -> Option<i64> {
     let is_length = row.facts.asks(OBJECT_SORTING, Ask::Unseen) && row.facts.shows_what_is_there();
     row.facts.objects().filter(|_| is_length)
-}
-
-fn difference<'a>(plus: &'a Aggregate, minus: &'a Aggregate) -> Vec<Term<'a>> {
-    vec![Term { sign: 1.0, row: plus }, Term { sign: -1.0, row: minus }]
-}
-
-/// A difference of two rows; `None` of a row and itself.
-fn different<'a>(plus: &'a Aggregate, minus: &'a Aggregate) -> Option<Vec<Term<'a>>> {
-    (!std::ptr::eq(plus, minus)).then(|| difference(plus, minus))
-}
-
-fn negated<'a>(terms: Vec<Term<'a>>) -> impl Iterator<Item = Term<'a>> {
-    terms.into_iter().map(|Term { sign, row }| Term { sign: -sign, row })
-}
-
-impl Check<'_> {
-    /// `None` without figures.
-    fn judge(&self) -> Option<Judged> {
-        match self {
-            Self::Above(sums) => {
-                let verdict = sums.iter().map(|terms| direction(terms)).max()?;
-                let told: Vec<String> = sums.iter().map(|terms| tell(terms.iter().map(|term| term.row))).collect();
-                Some((verdict, told.join("; ")))
-            }
-            Self::AtLeast(least, rows) => {
-                let lowest = rows.iter().map(|row| row.mean_success_rate).reduce(f64::min)?;
-                let verdict = if lowest >= *least { Verdict::Reproduced } else { Verdict::NotReproduced };
-                Some((verdict, tell(rows.iter().copied())))
-            }
-            Self::Within(most, a, b) => {
-                // That neither ever succeeds is not what the paper tells of.
-                if a.successes + b.successes == 0 {
-                    return None;
-                }
-                let apart = (a.mean_success_rate - b.mean_success_rate).abs();
-                let verdict = if apart <= *most { Verdict::Reproduced } else { Verdict::NotReproduced };
-                Some((verdict, tell([*a, *b].into_iter())))
-            }
-        }
-    }
-}
-
-/// On which side of zero a sum of shares lies, if its interval is on one.
-fn direction(terms: &[Term<'_>]) -> Verdict {
-    let sum: f64 = terms.iter().map(|term| term.sign * term.row.mean_success_rate).sum();
-    let variance = |row: &Aggregate| {
-        let n = row.episodes as f64 + 2.0;
-        let share = (row.successes as f64 + 1.0) / n;
-        share * (1.0 - share) / n
-    };
-    let half_width = Z * terms.iter().map(|term| variance(term.row)).sum::<f64>().sqrt();
-    match sum {
-        sum if sum > half_width => Verdict::Reproduced,
-        sum if sum < -half_width => Verdict::NotReproduced,
-        _ => Verdict::NoDifference,
-    }
-}
-
-/// Shares with what tells them apart.
-fn tell<'a>(rows: impl Iterator<Item = &'a Aggregate>) -> String {
-    let one = |row: &Aggregate| {
-        let tasks = row.actor.train_tasks.map(|tasks| format!(", {tasks} tasks")).unwrap_or_default();
-        format!("{} {:.3} ({}{tasks})", row.actor.variant, row.mean_success_rate, row.suite)
-    };
-    rows.map(one).collect::<Vec<_>>().join(", ")
 }

@@ -15,10 +15,11 @@ use polars::prelude::DataType;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::actor::ModelParts;
 use crate::report::facts::BLOCK_STACKING;
 use crate::report::frames::{Rows, collect, scan};
 use crate::report::paper::{DETECTOR_BLOCKS, DETECTOR_DEVIATION_CM};
-use crate::report::summary::{ModelParts, SuiteResult};
+use crate::report::summary::SuiteResult;
 use crate::report::{ReportError, order};
 
 const COLUMNS: [(&str, DataType); 8] = [

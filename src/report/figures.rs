@@ -1,5 +1,5 @@
 //! The paper's figures from our rollouts: success over the length of tasks, the number of training tasks, the strength
-//! of an adversary, and the objects on a table. A figure is an entry of [`DEFINITIONS`] and nothing else.
+//! of an adversary, and the objects on a table. A figure is an entry of [`definitions`] and nothing else.
 //!
 //! # Invariants
 //!
@@ -7,13 +7,18 @@
 //! model the one that stands for it is shown ([`order::DECODERS`]). A point of the paper stands beside one of ours that
 //! meets its conditions ([`crate::report::paper`]), and nowhere else.
 
+mod definitions;
+
+pub(super) use definitions::USUAL_PUSH;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::facts::{Ask, BLOCK_STACKING, OBJECT_SORTING, TABLE_CLEANUP};
-use crate::report::kind::{Design, Sight};
+use crate::report::actor::ModelParts;
+use crate::report::facts::{Ask, TABLE_CLEANUP};
+use crate::report::figures::definitions::{DEFINITIONS, Definition, asks};
 use crate::report::order;
-use crate::report::summary::{Aggregate, ModelParts};
+use crate::report::summary::Aggregate;
 
 /// Success over some quantity, ours and the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -28,7 +33,7 @@ pub struct Figure {
     pub x_label: String,
     /// One for each variant.
     pub series: Vec<Series>,
-    /// Where the paper shows it, and what it says.
+    /// Where the paper shows it, and what it says where points of it are beside ours.
     pub source: String,
 }
 
@@ -96,125 +101,6 @@ pub struct GridCell {
     pub episodes: u64,
 }
 
-/// How a figure is made.
-struct Definition {
-    id: &'static str,
-    title: &'static str,
-    x_label: &'static str,
-    source: &'static str,
-    /// The quantity of a row; `None` where the row is not in the figure.
-    x: fn(&Aggregate) -> Option<i64>,
-    /// Whether the quantity is the number of training tasks. In other figures a variant is shown after the most alone.
-    is_over_tasks: bool,
-    /// What must be there for the figure to say anything.
-    is_worth_it: fn(&Figure) -> bool,
-}
-
-const DEFINITIONS: [Definition; 7] = [
-    Definition {
-        id: "sorting_length",
-        title: "Object Sorting: length",
-        x_label: "objects on the table",
-        source: "Experiment 1: NTP over 90 % from 4 to 40 objects; flat models from around 40 % to around 25 %",
-        x: |row| row.facts.objects().filter(|_| asks(row, OBJECT_SORTING, Ask::Unseen) && is_shown(row)),
-        is_over_tasks: false,
-        is_worth_it: two_places,
-    },
-    Definition {
-        id: "stacking_unseen",
-        title: "Block Stacking: unseen end configurations",
-        x_label: "training tasks",
-        source: "Experiment 2 and table \u{201c}Adversarial Dynamics\u{201d}, no failure: 0.863 and 0.884 with 1000 tasks",
-        x: |row| trained(row, Ask::Unseen).filter(|_| !row.actor.parts.sees()),
-        is_over_tasks: true,
-        is_worth_it: two_places,
-    },
-    Definition {
-        id: "stacking_pictures",
-        title: "Block Stacking: from pictures, unseen end configurations",
-        x_label: "training tasks",
-        source: "Experiment 4: full state above end to end above the detector; the text gives no number",
-        x: |row| trained(row, Ask::Unseen).filter(|_| row.actor.parts.is(Design::NTP)),
-        is_over_tasks: true,
-        is_worth_it: |figure| two_places(figure) && figure.series.iter().any(|series| series.parts.sees()),
-    },
-    Definition {
-        id: "stacking_seen",
-        title: "Block Stacking: seen end configurations",
-        x_label: "training tasks",
-        source: "Experiment 2: all but Flat around 85 %",
-        x: |row| trained(row, Ask::Seen),
-        is_over_tasks: true,
-        is_worth_it: two_places,
-    },
-    Definition {
-        id: "stacking_topology",
-        title: "Block Stacking: towers in another order",
-        x_label: "training tasks",
-        source: "Experiment 2, task topology; the text gives no number",
-        x: |row| trained(row, Ask::Topology),
-        is_over_tasks: true,
-        is_worth_it: two_places,
-    },
-    Definition {
-        id: "stacking_adversary",
-        title: "Block Stacking: adversary",
-        x_label: "chance of a push after each placement, %",
-        source: "Table \u{201c}Adversarial Dynamics\u{201d}: 0.863 to 0.663, with a GRU 0.884 to 0.422",
-        x: |row| pushed(row, |_, mns| mns == USUAL_PUSH.1).map(|(percent, _)| percent),
-        is_over_tasks: false,
-        is_worth_it: two_places,
-    },
-    Definition {
-        id: "stacking_adversary_force",
-        title: "Block Stacking: force of the adversary",
-        x_label: "impulse of a push at 25 %, mN\u{202f}s",
-        source: "Ours; the paper gives no force",
-        x: |row| pushed(row, |percent, _| percent == USUAL_PUSH.0).map(|(_, mns)| mns),
-        is_over_tasks: false,
-        is_worth_it: |figure| n_places(figure) >= 3,
-    },
-];
-
-/// The paper's chance of a push in percent, and the simulator's usual impulse in millinewton seconds.
-pub(super) const USUAL_PUSH: (i64, i64) = (25, 60);
-
-fn asks(row: &Aggregate, family: &'static str, ask: Ask) -> bool {
-    row.facts.asks(family, ask)
-}
-
-/// Whether as much is on the table as in the demonstration.
-fn is_shown(row: &Aggregate) -> bool {
-    row.facts.shows_what_is_there()
-}
-
-/// The training tasks of a row of Block Stacking.
-fn trained(row: &Aggregate, ask: Ask) -> Option<i64> {
-    row.actor.train_tasks.filter(|_| asks(row, BLOCK_STACKING, ask))
-}
-
-/// Chance and impulse of the pushes in a row of Block Stacking: those that are asked for, and none at all.
-fn pushed(row: &Aggregate, is_asked_for: fn(i64, i64) -> bool) -> Option<(i64, i64)> {
-    let (percent, mns) = row.facts.push_percent().zip(row.facts.push_mns())?;
-    let is_in = asks(row, BLOCK_STACKING, Ask::Unseen)
-        || asks(row, BLOCK_STACKING, Ask::Adversary) && is_asked_for(percent, mns);
-    let sees = row.actor.parts.sight() != Some(Sight::Positions);
-    is_in.then_some((percent, mns)).filter(|_| !sees)
-}
-
-/// How many quantities have a point.
-fn n_places(figure: &Figure) -> usize {
-    let mut places: Vec<i64> = figure.series.iter().flat_map(|series| &series.ours).map(|point| point.x).collect();
-    places.sort_unstable();
-    places.dedup();
-    places.len()
-}
-
-/// With one there is nothing to see.
-fn two_places(figure: &Figure) -> bool {
-    n_places(figure) >= 2
-}
-
 /// Those figures of each experiment that its rollouts have enough points of.
 pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
     let experiments = experiments(aggregates);
@@ -238,13 +124,18 @@ fn figure(definition: &Definition, rows: &[&Aggregate]) -> Figure {
     let placed = |row: &&'_ Aggregate| (definition.x)(row).is_some();
     let rows: Vec<&Aggregate> = rows.iter().copied().filter(placed).collect();
     let models = rows.chunk_by(|a, b| a.actor.variant == b.actor.variant);
+    let series: Vec<Series> = models.map(|rows| series(definition, rows)).collect();
+    let is_beside = series.iter().any(|series| !series.paper.is_empty());
     Figure {
         experiment: rows.first().map(|row| row.actor.experiment.clone()).unwrap_or_default(),
         id: definition.id.to_owned(),
         title: definition.title.to_owned(),
         x_label: definition.x_label.to_owned(),
-        series: models.map(|rows| series(definition, rows)).collect(),
-        source: definition.source.to_owned(),
+        series,
+        source: match definition {
+            Definition { source, says, .. } if is_beside => format!("{source}: {says}"),
+            Definition { source, .. } => (*source).to_owned(),
+        },
     }
 }
 

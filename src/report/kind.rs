@@ -1,6 +1,6 @@
 //! Kinds of models by their parts: the order in which they are told, and how they look.
 
-use crate::report::summary::ModelParts;
+use crate::report::actor::ModelParts;
 
 /// What a model is shown of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

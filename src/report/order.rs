@@ -4,8 +4,9 @@
 use std::cmp::Reverse;
 
 use crate::program::Program;
+use crate::report::actor::{Actor, ModelParts};
 use crate::report::facts::SuiteFacts;
-use crate::report::summary::{Actor, Aggregate, ModelParts};
+use crate::report::summary::Aggregate;
 use crate::task::Family;
 use crate::trace::SpecificationForm;
 

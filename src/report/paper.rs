@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::facts::{Ask, BLOCK_STACKING, OBJECT_SORTING};
+use crate::report::figures::USUAL_PUSH;
 use crate::report::kind::{Design, Sight};
 use crate::report::summary::Aggregate;
 
@@ -65,7 +66,7 @@ const SEEN: Conditions = Conditions { ask: Ask::Seen, words: "Block Stacking, 8 
 const ADVERSARY: Conditions = Conditions {
     ask: Ask::Adversary,
     words: "Block Stacking, 8 blocks, unseen tasks, an adversary",
-    push: (25, 60),
+    push: USUAL_PUSH,
     ..STACKING
 };
 /// Object Sorting after four training tasks.

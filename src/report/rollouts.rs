@@ -13,11 +13,12 @@ use std::path::PathBuf;
 
 use polars::prelude::{DataType, Expr, LazyFrame, NULL, SortMultipleOptions, UnionArgs, col, concat, len, lit, when};
 
+use crate::report::actor::{Actor, ModelParts};
 use crate::report::chart::histogram::KINDS;
 use crate::report::facts::{self, SuiteFacts};
 use crate::report::frames::{Rows, collect, scan, scan_with};
 use crate::report::interval::wilson;
-use crate::report::summary::{Actor, Divergence, FirstError, ModelParts, SuiteResult};
+use crate::report::summary::{Divergence, FirstError, SuiteResult};
 use crate::report::{ReportError, order};
 
 const COLUMNS: [(&str, DataType); 17] = [

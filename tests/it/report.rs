@@ -887,6 +887,11 @@ fn a_figure_of_the_paper_has_ours_and_theirs_by_length() {
     };
     assert_eq!(points(0), ("ntp", vec![(4, 0.95), (40, 0.9)], vec![(4, 0.9), (40, 0.9)]));
     assert_eq!(points(1), ("flat_paper", vec![(4, 0.1)], vec![(4, 0.4)]));
+    assert!(figure.source.contains("over 90 %"));
+    let few = rows.concat().into_iter().map(|row| Rollout { train_tasks: 2, ..row });
+    let [figure] = <[_; 1]>::try_from(Run::new(&few.collect::<Vec<_>>()).make().figures).unwrap();
+    let n_theirs: usize = figure.series.iter().map(|series| series.paper.len()).sum();
+    assert_eq!((n_theirs, figure.source.as_str()), (0, "Experiment 1"), "the paper trains on four tasks");
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
+use crate::report::actor::model_name;
 use crate::report::chart::scale::{coordinate, nice_step, power_of_ten, thousands};
 use crate::report::chart::{PANEL, Tick, distinct};
 use crate::report::metrics::{Curve, CurvePoint, PARTS};
-use crate::report::summary::model_name;
 
 /// No decade below this is drawn: what is smaller lies on the axis.
 const LOWEST_EXPONENT: i32 = -6;

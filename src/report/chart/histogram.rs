@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
+use crate::report::actor::Actor;
 use crate::report::chart::scale::{coordinate, nice_step, thousands};
 use crate::report::chart::{Key, PANEL, Tick, distinct};
 use crate::report::order;
-use crate::report::summary::{Actor, Aggregate, Divergence, FirstError};
+use crate::report::summary::{Aggregate, Divergence, FirstError};
 
 /// What can differ, and its colour.
 pub(in crate::report) const KINDS: [(&str, usize); 5] =

@@ -11,7 +11,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::claims::{Check, Claim, difference, different, experiment_of};
+use crate::report::claims::check::{Check, difference, different};
+use crate::report::claims::{Claim, experiment_of};
 use crate::report::facts::{Ask, BLOCK_STACKING};
 use crate::report::kind::Design;
 use crate::report::order;

@@ -1,9 +1,10 @@
 //! Success at a glance: a table for each experiment, models down, suites across.
 
+use crate::report::actor::Actor;
 use crate::report::chart::distinct;
 use crate::report::markdown::{Column, none, table};
 use crate::report::order;
-use crate::report::summary::{Actor, Aggregate, Report};
+use crate::report::summary::{Aggregate, Report};
 
 /// Of each experiment with more than one suite. Beside ours stands the paper's figure.
 pub(super) fn glances(report: &Report) -> Vec<String> {

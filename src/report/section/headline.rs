@@ -3,10 +3,11 @@
 use minijinja::Value;
 use serde::Serialize;
 
+use crate::report::actor::Actor;
 use crate::report::chart::scale::{percent, plural, points};
 use crate::report::order;
 use crate::report::section::{Contents, Section};
-use crate::report::summary::{Actor, Aggregate};
+use crate::report::summary::Aggregate;
 
 /// The section.
 pub(super) const SECTION: Section = Section {

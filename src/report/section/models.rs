@@ -3,10 +3,11 @@
 use minijinja::Value;
 use serde::Serialize;
 
+use crate::report::actor::model_name;
 use crate::report::chart::distinct;
 use crate::report::chart::scale::thousands;
 use crate::report::section::{Contents, Section};
-use crate::report::summary::{ModelSummary, StageCost, model_name};
+use crate::report::summary::{ModelSummary, StageCost};
 
 /// The section.
 pub(super) const SECTION: Section = Section {
