@@ -1,7 +1,7 @@
 //! NTP in burn: encoders, interpreter, core, program memory, argument decoder.
 //!
 //! A variant is a type that implements [`Network`] and is put together from parts, which are types too: an
-//! [`Encoder`], a [`Core`] and a [`Scoping`]. All share the program memory.
+//! [`Encoder`], a [`Core`] and a [`ScopingKind`]. All share the program memory.
 //!
 //! # Shapes
 //!
@@ -20,17 +20,19 @@ mod build;
 mod colour_slots;
 mod config;
 mod convolution;
+mod core_kind;
 mod core_network;
-mod decisions;
 mod decoder;
 mod detecting;
 mod detector;
 mod encoder;
+mod encoder_kind;
 mod features;
 mod flattened;
 mod instructed;
 mod keypoints;
 mod layers;
+mod limits;
 mod linear;
 mod memory;
 mod network;
@@ -39,10 +41,14 @@ mod object_centric;
 mod perception;
 mod pictures;
 mod programmer;
+mod read_error;
 mod scoping;
+mod scoping_kind;
 mod sighted;
+mod specification_rows;
 mod store;
 mod summary;
+mod values;
 mod variant;
 mod vectors;
 mod windows;
@@ -50,32 +56,39 @@ mod windows;
 pub use build::{NetworkUse, with_network};
 pub use colour_slots::{ColourSlots, ColourSlotsConfig};
 pub use config::{ModelConfig, NetworkConfig};
+pub use core_kind::CoreKind;
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
-pub use decisions::{Decisions, MAX_ARGUMENTS};
 pub use decoder::{Decoder, LabelScores, span_score};
 pub use detecting::{Detecting, Detections, detected_rows};
 pub use detector::{
-    DetectionLoss, Detector, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig, detector_of,
+    DetectionLoss, Detector, DetectorDefaults, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig,
+    detector_of,
 };
 pub(crate) use detector::{loss as detection_loss, positions_in_world};
-pub use encoder::{ArgumentDecoder, Encoder, Widths};
-pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened, FlattenedConfig};
+pub use encoder::{ArgumentDecoder, Encoder, TrainingDefaults, Widths};
+pub use encoder_kind::EncoderKind;
+pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};
 pub use keypoints::{CellLooks, GlimpseNaming, Keypoints, KeypointsConfig};
+pub use limits::ConfigError;
 pub use linear::Linear;
 pub use memory::ProgramMemory;
-pub use network::{CoreOutput, Given, Network};
+pub use network::{CalledWith, CoreOutput, Network};
 pub use npi::{BySlot, ByVector, CallEncoder, Npi, NpiReading, SlotReading};
 pub use object_centric::{ObjectCentric, ObjectCentricConfig, ObjectDemonstration, ObjectReading};
 pub use perception::{Looks, Perception};
-pub use pictures::{PictureSample, Pictures};
-pub use programmer::{Flat, FlatGru, Ntp, NtpGru, NtpNoScope, Programmer};
-pub use scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
-pub use sighted::{PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
+pub use pictures::{PictureIndex, PictureSample, Pictures};
+pub use programmer::{Ntp, NtpGru, Programmer};
+pub use read_error::ReadError;
+pub use scoping::ScopeHead;
+pub use scoping_kind::{MAX_ARGUMENTS, ScopingKind};
+pub use sighted::{Naming, PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
+pub use specification_rows::{SpecificationRows, States};
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,
 };
-pub use variant::{Architecture, EncoderKind, Variant};
-pub use vectors::{Convolved, ConvolvedConfig, Positions, Vectors};
+pub use values::{TensorError, scalar, values};
+pub use variant::{Variant, VariantError};
+pub use vectors::{Convolved, ConvolvedConfig, FlattenedConfig, Positions, Vectors};
 pub use windows::Windows;

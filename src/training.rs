@@ -30,6 +30,7 @@ mod metrics;
 mod recovery;
 mod run;
 mod seen;
+mod sub_task;
 
 pub use batch::{Group, Part, draw};
 pub use config::{Curriculum, LossWeights, Pairing, TrainConfig, Training};
@@ -37,7 +38,7 @@ pub use detector_config::DetectorTraining;
 pub use detector_metrics::{DetectorMetric, SCHEMA as DETECTOR_METRICS};
 pub use error::TrainError;
 pub use examples::{Example, Examples, Grain};
-pub use learner::{Learner, Losses, losses};
+pub use learner::{Learner, Losses, Stepped, losses};
 pub use metrics::{Metric, SCHEMA as METRICS};
 pub use seen::Gallery;
 
@@ -49,7 +50,7 @@ use burn::tensor::Device;
 use crate::artifact::{self, IoError};
 use crate::dataset::DatasetTrials;
 use crate::model::{
-    Architecture, CONFIG_FILE, Detecting, Detector, EncoderKind, ModelConfig, Network, NetworkUse, Variant,
+    CONFIG_FILE, Detecting, Detector, EncoderKind, ModelConfig, Network, NetworkUse, ScopingKind, Variant,
     VggDetectorConfig, WEIGHTS_FILE, weights_to_bytes, with_network,
 };
 use crate::seed::Seed;
@@ -81,6 +82,8 @@ pub struct TrainSummary {
     pub steps: u32,
     /// Decisions learned from.
     pub examples: u64,
+    /// Gradients that were no numbers and were left out.
+    pub dropped_gradients: u32,
     /// The step it was resumed at; 0 when it began afresh.
     pub resumed_at: u32,
     /// The learning curves.
@@ -106,7 +109,7 @@ pub fn train(
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
-    train_seeing(training, data, None, folder, hooks)
+    train_on_pictures(training, data, None, folder, hooks)
 }
 
 /// The same with the pictures of the trials' frames, for a variant that sees.
@@ -114,7 +117,7 @@ pub fn train(
 /// # Errors
 ///
 /// As [`train`]; and when there are none for such a variant.
-pub fn train_seeing(
+pub fn train_on_pictures(
     training: &Training,
     data: &DatasetTrials,
     gallery: Option<&dyn Gallery>,
@@ -136,7 +139,7 @@ pub fn train_seeing(
     let written =
         serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
     let mut model = ModelConfig::new(training.variant, training.specification, family, data.n_slots, written);
-    if training.variant.architecture() == Architecture::Npi {
+    if training.variant.scoping() == ScopingKind::Arguments {
         model.tasks = Examples::new(data)?.task_ids();
     }
     let device = Device::flex().autodiff();
@@ -146,7 +149,7 @@ pub fn train_seeing(
             let (key, found) = ("size of the pictures", format!("{width}x{height} pixels"));
             return Err(TrainError::Config { key, found, allowed: "as wide as high" });
         }
-        model.network = model.network.seeing(width, data.n_slots);
+        model.network = model.network.for_pictures(width, data.n_slots);
         if let Some(colours) = training.config.colours {
             check_colours(training.variant, colours, data.n_slots)?;
             model.network = model.network.telling_apart(colours as usize);
@@ -156,7 +159,7 @@ pub fn train_seeing(
         }
     }
     let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
-    with_network(&model, seed, &device, learning)
+    with_network(&model, seed, &device, learning)?
 }
 
 /// Refuses pictures that are too small for a network.
@@ -201,7 +204,7 @@ impl NetworkUse for Learning<'_, '_> {
     fn run<N: Network>(self, network: N) -> Self::Output {
         let Self { config, data, gallery, model, folder, seed, hooks } = self;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
-        let examples = Examples::of(data, model.network.specification(), N::DECISIONS, grain)?;
+        let examples = Examples::of(data, model.network.specification(), network.scoping(), grain)?;
         let gallery = gallery.filter(|_| model.variant.sees());
         let run = Run { config, examples: &examples, gallery, model, folder, seed };
         let (network, trained) = run.train(network, hooks)?;
@@ -227,14 +230,16 @@ impl NetworkUse for Learning<'_, '_> {
         let (detector, standing) = DetectorRun { config, data, gallery, model, folder, seed }.train(detector, hooks)?;
         let detected = detector::detected(&detector, data, gallery)?;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
-        let examples = Examples::of(&detected, SpecificationForm::Trajectories, N::DECISIONS, grain)?;
+        let examples = Examples::of(&detected, SpecificationForm::Trajectories, programmer.scoping(), grain)?;
         let run = Run { config, examples: &examples, gallery: None, model, folder, seed };
         let (programmer, trained) = run.train(programmer, hooks)?;
         detector_metrics::write(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
         let network = Detecting::new(detector, programmer, data.n_slots);
         write(folder, model, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;
-        Ok(trained.summary())
+        let summary = trained.summary();
+        let dropped_gradients = summary.dropped_gradients + standing.dropped_gradients;
+        Ok(TrainSummary { dropped_gradients, ..summary })
     }
 }
 

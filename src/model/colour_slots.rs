@@ -30,10 +30,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::clusters::{centres, most_mobile};
 use crate::model::colour_slots::foreground::{COLOUR_WIDTH, Foreground, background, foreground};
+use crate::model::encoder::TrainingDefaults;
 use crate::model::layers::{Init, replaced};
+use crate::model::limits::{ConfigError, check_sizes};
 use crate::model::perception::Perception;
 use crate::model::pictures::{PictureSample, Pictures};
-use crate::model::sighted::PerceptNaming;
+use crate::model::read_error::ReadError;
+use crate::model::sighted::{Naming, PerceptNaming};
+use crate::model::values::{TensorError, values};
 use crate::seed::Seed;
 
 /// A score that no softmax lets through.
@@ -53,6 +57,13 @@ pub struct ColourSlotsConfig {
     pub colours: usize,
 }
 
+impl ColourSlotsConfig {
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        check_sizes(&[("pixels", self.pixels), ("colours", self.colours)])
+    }
+}
+
 /// Prototypes of colours, and the background that is left out.
 #[derive(Module, Debug)]
 pub struct ColourSlots {
@@ -65,6 +76,9 @@ pub struct ColourSlots {
 }
 
 impl ColourSlots {
+    /// Augmentations change positions; here there are pictures.
+    pub(crate) const TRAINING: TrainingDefaults = TrainingDefaults::plain(2000, 0.003);
+
     /// Fresh ones by themselves; the same seed gives the same prototypes.
     pub fn fresh(config: &ColourSlotsConfig, seed: Seed, device: &Device) -> Self {
         Self::new(config, &mut Init::new(seed, device))
@@ -74,30 +88,28 @@ impl ColourSlots {
         self.prototypes.device()
     }
 
-    fn background(&self) -> Vec<f32> {
-        self.background.val().into_data().try_into_vec().unwrap_or_default()
+    fn background(&self) -> Result<Vec<f32>, TensorError> {
+        values(self.background.val())
     }
 
     /// The pixels of pictures that are no background, and whose they are.
-    pub(crate) fn claims(&self, pictures: &Pictures) -> Claims {
-        let prototypes: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
-        let log_sharpness: Vec<f32> = self.log_sharpness.val().into_data().try_into_vec().unwrap_or_default();
-        let background = self.background();
-        Claims::of(pictures, &background, &foreground(pictures, &background), &prototypes, &log_sharpness)
+    pub(crate) fn claims(&self, pictures: &Pictures) -> Result<Claims, TensorError> {
+        let (prototypes, log_sharpness) = (values(self.prototypes.val())?, values(self.log_sharpness.val())?);
+        let background = self.background()?;
+        Ok(Claims::of(pictures, &background, &foreground(pictures, &background), &prototypes, &log_sharpness))
     }
 
     /// The same with the colours of `slots` right behind the robot's, in this order; the others follow.
-    #[must_use]
-    pub(crate) fn with_first(mut self, slots: &[usize]) -> Self {
+    pub(crate) fn with_first(mut self, slots: &[usize]) -> Result<Self, TensorError> {
         let n_colours = self.prototypes.dims()[1];
         let others = (1..n_colours).filter(|colour| !slots.contains(colour));
         let order: Vec<usize> = std::iter::once(0).chain(slots.iter().copied()).chain(others).collect();
         let device = self.device();
-        let before: Vec<f32> = self.prototypes.val().into_data().try_into_vec().unwrap_or_default();
+        let before = values(self.prototypes.val())?;
         let columns = before.chunks_exact(n_colours).flat_map(|feature| order.iter().map(|&colour| feature[colour]));
         let data = TensorData::new(columns.collect::<Vec<_>>(), [COLOUR_WIDTH, n_colours]);
         self.prototypes = replaced(&self.prototypes, data, &device);
-        self
+        Ok(self)
     }
 
     /// Minus the sharpened squared distance of each point's colour to each prototype, `[F, P, K]`.
@@ -116,10 +128,13 @@ impl ColourSlots {
     }
 }
 
+impl Naming for ColourSlots {
+    type Decoder = PerceptNaming;
+}
+
 impl Perception for ColourSlots {
     type Config = ColourSlotsConfig;
     type Looks = ();
-    type Naming = PerceptNaming;
 
     fn new(config: &ColourSlotsConfig, init: &mut Init) -> Self {
         let log_sharpness = init.filled([1, config.colours], SHARPNESS.ln());
@@ -134,7 +149,7 @@ impl Perception for ColourSlots {
         config.colours
     }
 
-    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
+    fn calibrated(mut self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError> {
         let device = self.device();
         let background = background(&sample.pictures);
         let seen = foreground(&sample.pictures, &background);
@@ -148,11 +163,11 @@ impl Perception for ColourSlots {
         let n_values = background.len();
         let values = TensorData::new(background, [n_values]);
         self.background = replaced(&self.background, values, &device).set_require_grad(false);
-        self
+        Ok(self)
     }
 
-    fn look(&self, pictures: &Pictures) -> (Tensor<3>, ()) {
-        let seen = foreground(pictures, &self.background());
+    fn look(&self, pictures: &Pictures) -> Result<(Tensor<3>, ()), ReadError> {
+        let seen = foreground(pictures, &self.background()?);
         let scores = self.scores(&seen);
         let places = TensorData::new(seen.places(), [seen.n_pictures, 2, seen.n_points]);
         let places = Tensor::<3>::from_data(places, &self.device());
@@ -162,6 +177,6 @@ impl Perception for ColourSlots {
         let variances = (squares - centres.clone().powf_scalar(2.0)).sum_dim(1).clamp_min(0.0); // [F, 1, K]
         let full = MASS_PIXELS * (pictures.width * pictures.height) as f32;
         let masses = scores.exp().sum_dim(1) / full;
-        (Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2), ())
+        Ok((Tensor::cat(vec![centres, masses, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2), ()))
     }
 }

@@ -4,13 +4,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::ColourSlotsConfig;
 use crate::model::detector::{PointDetectorConfig, VggDetectorConfig};
-use crate::model::flattened::FlattenedConfig;
+use crate::model::encoder_kind::EncoderKind;
 use crate::model::instructed::InstructedConfig;
 use crate::model::keypoints::KeypointsConfig;
+use crate::model::limits::{ConfigError, check_sizes};
 use crate::model::object_centric::ObjectCentricConfig;
+use crate::model::scoping_kind::ScopingKind;
 use crate::model::sighted::SightedConfig;
-use crate::model::variant::{EncoderKind, Variant};
+use crate::model::variant::Variant;
 use crate::model::vectors::ConvolvedConfig;
+use crate::model::vectors::FlattenedConfig;
 use crate::program::KnownPrograms;
 use crate::task::Family;
 use crate::trace::SpecificationForm;
@@ -26,7 +29,7 @@ pub enum NetworkConfig {
     ObjectCentric(ObjectCentricConfig),
     /// Of [`EncoderKind::Flattened`].
     Flattened(FlattenedConfig),
-    /// Of variant `ntp` with instructions for a specification.
+    /// Of [`Variant::NTP`] with instructions for a specification.
     Instructed(InstructedConfig),
     /// Of [`EncoderKind::ColourSlots`].
     ColourSlots(SightedConfig<ColourSlotsConfig>),
@@ -66,7 +69,7 @@ impl NetworkConfig {
     /// The same for pictures of a size, with a colour for each of `n_slots` objects, one for the gripper and some for
     /// what else there is to see; widths that see nothing stay as they are.
     #[must_use]
-    pub fn seeing(self, pixels: usize, n_slots: usize) -> Self {
+    pub fn for_pictures(self, pixels: usize, n_slots: usize) -> Self {
         let perception = ColourSlotsConfig { pixels, colours: n_slots + 1 + SPARE_COLOURS };
         match self {
             Self::ColourSlots(config) => Self::ColourSlots(SightedConfig { perception, ..config }),
@@ -122,6 +125,11 @@ impl NetworkConfig {
         }
     }
 
+    /// The name in files.
+    fn name(&self) -> &'static str {
+        self.encoder().map_or("instructed", EncoderKind::name)
+    }
+
     /// What the network reads as task specification.
     pub fn specification(&self) -> SpecificationForm {
         match self {
@@ -137,15 +145,34 @@ impl NetworkConfig {
 
     /// Whether they are a variant's.
     pub fn is_for(&self, variant: Variant) -> bool {
+        self.encoder().map_or(variant == Variant::NTP, |encoder| encoder == variant.encoder())
+    }
+
+    /// The encoder that they are of; `None` for that of instructions.
+    fn encoder(&self) -> Option<EncoderKind> {
+        Some(match self {
+            Self::Instructed(_) => return None,
+            Self::ObjectCentric(_) => EncoderKind::ObjectCentric,
+            Self::Flattened(_) => EncoderKind::Flattened,
+            Self::ColourSlots(_) => EncoderKind::ColourSlots,
+            Self::Convolved(_) => EncoderKind::Convolved,
+            Self::Keypoints(_) => EncoderKind::Keypoints,
+            Self::Detected(..) => EncoderKind::Detected,
+            Self::DetectedFlattened(..) => EncoderKind::DetectedFlattened,
+        })
+    }
+
+    /// Whether a network of `n_slots` slots can have these sizes.
+    fn check(&self, n_slots: usize) -> Result<(), ConfigError> {
         match self {
-            Self::ObjectCentric(_) => variant.encoder() == EncoderKind::ObjectCentric,
-            Self::Flattened(_) => variant.encoder() == EncoderKind::Flattened,
-            Self::Instructed(_) => variant == Variant::Ntp,
-            Self::ColourSlots(_) => variant.encoder() == EncoderKind::ColourSlots,
-            Self::Convolved(_) => variant.encoder() == EncoderKind::Convolved,
-            Self::Keypoints(_) => variant.encoder() == EncoderKind::Keypoints,
-            Self::Detected(..) => variant.encoder() == EncoderKind::Detected,
-            Self::DetectedFlattened(..) => variant.encoder() == EncoderKind::DetectedFlattened,
+            Self::ObjectCentric(widths) => widths.check(),
+            Self::Flattened(widths) => widths.check(),
+            Self::Instructed(widths) => widths.check(),
+            Self::ColourSlots(widths) => widths.perception.check().and_then(|()| widths.check()),
+            Self::Convolved(widths) => widths.check(),
+            Self::Keypoints(widths) => widths.perception.check(n_slots).and_then(|()| widths.check()),
+            Self::Detected(detector, widths) => detector.check(n_slots).and_then(|()| widths.check()),
+            Self::DetectedFlattened(detector, widths) => detector.check().and_then(|()| widths.check()),
         }
     }
 }
@@ -164,7 +191,7 @@ pub struct ModelConfig {
     pub n_slots: usize,
     /// Hash of the programs that it knows: those of its family.
     pub vocabulary: String,
-    /// The tasks that it knows by name, where it knows any: those of [`Variant::Npi`], in order.
+    /// The tasks that it knows by name, where it knows any: those of [`ScopingKind::Arguments`], in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<String>,
     /// Widths.
@@ -200,5 +227,20 @@ impl ModelConfig {
             network: NetworkConfig::of(variant, specification),
             training,
         }
+    }
+
+    /// Whether a network can be made of it.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] for the first key that makes no sense, with what is allowed.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let Self { version: _, variant, family: _, n_slots, vocabulary: _, tasks, network, training: _ } = self;
+        check_sizes(&[("n_slots", *n_slots)])?;
+        ConfigError::unless(network.is_for(*variant), "network", network.name(), "widths of the variant's encoder")?;
+        let knows_tasks = variant.scoping() == ScopingKind::Arguments;
+        let allowed = "none but for scoping arguments, which knows tasks by name";
+        ConfigError::unless(knows_tasks || tasks.is_empty(), "tasks", tasks.len(), allowed)?;
+        network.check(*n_slots)
     }
 }

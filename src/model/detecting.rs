@@ -12,13 +12,15 @@
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Device, Tensor};
 
-use crate::model::decisions::Decisions;
 use crate::model::detector::{self, Detector};
-use crate::model::network::{CoreOutput, Given, Network};
-use crate::model::pictures::Pictures;
+use crate::model::network::{CalledWith, CoreOutput, Network};
+use crate::model::pictures::{PictureIndex, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::scoping_kind::ScopingKind;
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
 use crate::program::Program;
-use crate::trace::{Observation, Span};
+use crate::trace::{ObservationRows, Span};
 
 /// A detector and a network behind it.
 #[derive(Module, Debug)]
@@ -28,19 +30,22 @@ pub struct Detecting<D: Module, N: Module> {
     n_slots: usize,
 }
 
-/// Observation rows of pictures, as detected.
+/// Observations of pictures, as detected: a row each.
 #[derive(Clone, Debug)]
-pub struct Detections {
-    width: usize,
-    rows: Vec<f32>,
-}
+pub struct Detections(ObservationRows);
 
 impl Detections {
     /// The rows of some pictures, one after the other.
-    fn of(&self, pictures: &[f32]) -> Vec<f32> {
-        let row =
-            |&picture: &f32| self.rows.get(picture as usize * self.width..).and_then(|rows| rows.get(..self.width));
-        pictures.iter().filter_map(row).flatten().copied().collect()
+    fn of(&self, pictures: &[PictureIndex]) -> Result<ObservationRows, ReadError> {
+        let mut rows = ObservationRows::new(self.0.n_slots(), Vec::new());
+        for &PictureIndex(picture) in pictures {
+            let at = picture as usize;
+            if at >= self.0.len() {
+                return Err(ReadError::Picture { found: picture, n: self.0.len() });
+            }
+            rows.append(&self.0.slice(at..at + 1));
+        }
+        Ok(rows)
     }
 }
 
@@ -56,14 +61,23 @@ impl<D: Detector, N: Network<Percepts = ()>> Detecting<D, N> {
     }
 }
 
-/// Observation rows of pictures: what a detector finds in them, relative to the grippers beside them: `[F, 3 N + 2]` in
-/// metres.
-pub fn detected_rows<D: Detector>(detector: &D, pictures: &Pictures) -> Vec<f32> {
-    if pictures.n > 0 { detector::rows(detector.detect(pictures), &pictures.grippers) } else { Vec::new() }
+/// Observations of pictures: what a detector for `n_slots` slots finds in them, relative to the grippers beside them.
+///
+/// # Errors
+///
+/// [`ReadError`] when a tensor's numbers cannot be read.
+pub fn detected_rows<D: Detector>(
+    detector: &D,
+    pictures: &Pictures,
+    n_slots: usize,
+) -> Result<ObservationRows, ReadError> {
+    if pictures.n == 0 {
+        return Ok(ObservationRows::new(n_slots, Vec::new()));
+    }
+    Ok(detector::rows(detector.detect(pictures)?, &pictures.grippers)?)
 }
 
 impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecting<D, N> {
-    const DECISIONS: Decisions = N::DECISIONS;
     const IS_RECURRENT: bool = N::IS_RECURRENT;
 
     type Percepts = Detections;
@@ -71,16 +85,20 @@ impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecti
     type Reading = N::Reading;
     type Recall = N::Recall;
 
-    fn perceive(&self, pictures: &Pictures) -> Detections {
-        Detections { width: Observation::width(self.n_slots), rows: detected_rows(&self.detector, pictures) }
+    fn scoping(&self) -> ScopingKind {
+        self.programmer.scoping()
     }
 
-    fn detected(percepts: &Detections) -> Option<&[f32]> {
-        Some(&percepts.rows)
+    fn perceive(&self, pictures: &Pictures) -> Result<Detections, ReadError> {
+        Ok(Detections(detected_rows(&self.detector, pictures, self.n_slots)?))
     }
 
-    fn demonstration(&self, windows: &Windows, percepts: &Detections) -> N::Demonstration {
-        let detected = windows.with_rows(percepts.width, |pictures| percepts.of(pictures));
+    fn detected(percepts: &Detections) -> Option<&ObservationRows> {
+        Some(&percepts.0)
+    }
+
+    fn demonstration(&self, windows: &Windows, percepts: &Detections) -> Result<N::Demonstration, ReadError> {
+        let detected = windows.with_observations(|pictures| percepts.of(pictures))?;
         self.programmer.demonstration(&detected, &())
     }
 
@@ -91,11 +109,12 @@ impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecti
     fn read(
         &self,
         demonstration: &N::Demonstration,
-        states: &[f32],
+        states: &States,
         percepts: &Detections,
-        given: &[Given],
-    ) -> N::Reading {
-        self.programmer.read(demonstration, &percepts.of(states), &(), given)
+        called_with: &[CalledWith],
+    ) -> Result<N::Reading, ReadError> {
+        let states = States::Observations(percepts.of(states.pictures()?)?);
+        self.programmer.read(demonstration, &states, &(), called_with)
     }
 
     fn core(

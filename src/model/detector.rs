@@ -2,7 +2,7 @@
 //!
 //! # Shapes
 //!
-//! A detection is a row of `3 N` numbers: x, y, z of each slot in the world, in decimetres. Where the gripper is and
+//! A detection is x, y, z of each slot in the world, in decimetres: a row of `3 N` numbers. Where the gripper is and
 //! whether it is closed a robot knows of itself: observation rows are relative to that.
 //!
 //! # Source
@@ -20,15 +20,35 @@ use burn::tensor::{Device, Tensor, TensorData};
 pub use points::{PointDetector, PointDetectorConfig};
 pub use vgg::{VggDetector, VggDetectorConfig};
 
+use crate::model::encoder::TrainingDefaults;
 use crate::model::layers::Init;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::values::{TensorError, values};
 use crate::seed::Seed;
-use crate::trace::{GripperState, Observation};
+use crate::trace::{GripperState, Observation, ObservationRow, ObservationRows};
 
 /// Detections are in decimetres: numbers of about one.
 const PER_METRE: f32 = 10.0;
+/// Numbers of a position: x, y and z.
+pub(crate) const AXES: usize = 3;
 /// Errors below three millimetres count by their square, larger ones as they are.
 const SMALL_ERROR: f32 = 0.03;
+
+/// How a detector is trained unless a pipeline file says otherwise. The values stand beside each detector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetectorDefaults {
+    /// Steps of the optimizer.
+    pub steps: u32,
+    /// Pictures of a step.
+    pub pictures: u32,
+    /// Highest learning rate.
+    pub learning_rate: f32,
+    /// What its widths are divided by; nothing where they are not.
+    pub narrowed: Option<u32>,
+    /// Of the network behind it.
+    pub behind: TrainingDefaults,
+}
 
 /// Finds objects in a picture.
 pub trait Detector: Module + ModuleDisplay + Sync + Sized + 'static {
@@ -38,15 +58,22 @@ pub trait Detector: Module + ModuleDisplay + Sync + Sized + 'static {
     /// A fresh one for `n_slots` slots.
     fn new(config: &Self::Config, n_slots: usize, init: &mut Init) -> Self;
 
-    /// See [`super::Network::acquainted`]. `positions` are those in the sample's pictures, `[F, 3 N]` in the world in
+    /// See [`super::Network::calibrated`]. `positions` are those in the sample's pictures, `[F * N]` in the world in
     /// metres.
-    #[must_use]
-    fn acquainted(self, _sample: &PictureSample, _positions: &[f32], _seed: Seed) -> Self {
-        self
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn calibrated(self, _sample: &PictureSample, _positions: &[[f32; 3]], _seed: Seed) -> Result<Self, ReadError> {
+        Ok(self)
     }
 
     /// `F` pictures → `[F, 3 N]`. The grippers beside the pictures are not looked at.
-    fn detect(&self, pictures: &Pictures) -> Tensor<2>;
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] when a tensor's numbers cannot be read.
+    fn detect(&self, pictures: &Pictures) -> Result<Tensor<2>, ReadError>;
 
     /// Where the parameters are.
     fn device(&self) -> Device;
@@ -57,28 +84,31 @@ pub fn detector_of<D: Detector>(config: &D::Config, n_slots: usize, seed: Seed, 
     D::new(config, n_slots, &mut Init::new(seed, device))
 }
 
-/// Observation rows that detections amount to for robots in some states, `[F, 3 N + 2]` in metres.
-pub(crate) fn rows(detections: Tensor<2>, grippers: &[GripperState]) -> Vec<f32> {
-    let [n, width] = detections.dims();
-    let values: Vec<f32> = detections.into_data().try_into_vec().unwrap_or_default();
-    let mut rows = Vec::with_capacity(n * (width + 2));
-    for (positions, gripper) in values.chunks_exact(width.max(1)).zip(grippers) {
-        let origin = gripper.in_world_m.iter().cycle();
-        let closed = f32::from(u8::from(gripper.closed));
-        rows.extend(positions.iter().zip(origin).map(|(value, origin)| value / PER_METRE - origin));
-        rows.extend([1.0 - closed, closed]);
-    }
-    rows
+/// Observations that detections amount to for robots in some states, a row each.
+pub(crate) fn rows(detections: Tensor<2>, grippers: &[GripperState]) -> Result<ObservationRows, TensorError> {
+    let n_slots = detections.dims()[1] / AXES;
+    let positions = values(detections)?;
+    let pictures = positions.as_chunks::<AXES>().0.chunks_exact(n_slots.max(1)).zip(grippers);
+    let observation = |(positions, gripper): (&[[f32; AXES]], &GripperState)| {
+        let relative = |position: &[f32; AXES]| -> [f32; AXES] {
+            std::array::from_fn(|axis| position[axis] / PER_METRE - gripper.in_world_m[axis])
+        };
+        Observation { slots_m: positions.iter().map(relative).collect(), closed: gripper.closed }
+    };
+    let observations: Vec<Observation> = pictures.map(observation).collect();
+    Ok(ObservationRows::of(n_slots, &observations))
 }
 
-/// Where all slots' objects are in the world, `[F, 3 N]` in metres, by observation rows and the grippers that they are
+/// Where all slots' objects are in the world, `[F * N]` in metres, by observations and the grippers that they are
 /// relative to.
-pub(crate) fn positions_in_world(rows: &[f32], n_slots: usize, grippers: &[GripperState]) -> Vec<f32> {
-    let rows = rows.chunks_exact(Observation::width(n_slots)).zip(grippers);
-    let in_world = rows.flat_map(|(row, gripper)| {
-        row[..3 * n_slots].iter().zip(gripper.in_world_m.iter().cycle()).map(|(value, origin)| value + origin)
-    });
-    in_world.collect()
+pub(crate) fn positions_in_world(rows: &ObservationRows, grippers: &[GripperState]) -> Vec<[f32; 3]> {
+    let in_world = |position: &[f32; AXES], gripper: &GripperState| -> [f32; AXES] {
+        std::array::from_fn(|axis| position[axis] + gripper.in_world_m[axis])
+    };
+    let of_row = |(row, gripper): (ObservationRow<'_>, &GripperState)| -> Vec<[f32; AXES]> {
+        row.positions.iter().map(|position| in_world(position, gripper)).collect()
+    };
+    rows.iter().zip(grippers).flat_map(of_row).collect()
 }
 
 /// What a detector is told of its errors.
@@ -90,16 +120,16 @@ pub struct DetectionLoss {
     pub distance_m: f32,
 }
 
-/// How far detections are from positions in the world, `[F, 3 N]` in metres.
-pub(crate) fn loss(detections: Tensor<2>, positions: &[f32]) -> DetectionLoss {
+/// How far detections are from positions in the world, `[F * N]` in metres.
+pub(crate) fn loss(detections: Tensor<2>, positions: &[[f32; 3]]) -> Result<DetectionLoss, TensorError> {
     let device = detections.device();
-    let positions: Vec<f32> = positions.iter().map(|value| value * PER_METRE).collect();
+    let positions: Vec<f32> = positions.as_flattened().iter().map(|value| value * PER_METRE).collect();
     let positions = Tensor::<2>::from_data(TensorData::new(positions, detections.dims()), &device);
     let errors = detections - positions;
-    let distances: Vec<f32> = errors.clone().into_data().try_into_vec().unwrap_or_default();
-    let distances = distances.as_chunks::<3>().0;
-    let length = |error: &[f32; 3]| error.iter().map(|value| value * value).sum::<f32>().sqrt();
+    let distances = values(errors.clone())?;
+    let distances = distances.as_chunks::<AXES>().0;
+    let length = |error: &[f32; AXES]| error.iter().map(|value| value * value).sum::<f32>().sqrt();
     let distance_m = distances.iter().map(length).sum::<f32>() / distances.len().max(1) as f32 / PER_METRE;
     let smooth = (errors.powf_scalar(2.0) + SMALL_ERROR * SMALL_ERROR).sqrt() - SMALL_ERROR;
-    DetectionLoss { total: smooth.mean(), distance_m }
+    Ok(DetectionLoss { total: smooth.mean(), distance_m })
 }

@@ -8,6 +8,8 @@ use burn::tensor::{Device, Tensor};
 
 use crate::model::layers::Init;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
 use crate::seed::Seed;
 use crate::trace::Span;
@@ -34,6 +36,28 @@ impl Widths {
     }
 }
 
+/// How a network with an encoder is trained unless a pipeline file says otherwise. The values stand beside each encoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainingDefaults {
+    /// Steps of the optimizer.
+    pub steps: u32,
+    /// Highest learning rate.
+    pub learning_rate: f32,
+    /// How often slots are relabelled, 0 to 1.
+    pub relabel_slots: f32,
+    /// How often an empty gripper is put elsewhere before it moves, 0 to 1.
+    pub gripper_jitter: f32,
+    /// How often part of what was built lies on the table again, 0 to 1.
+    pub recovery_states: f32,
+}
+
+impl TrainingDefaults {
+    /// Without augmentations.
+    pub(crate) const fn plain(steps: u32, learning_rate: f32) -> Self {
+        Self { steps, learning_rate, relabel_slots: 0.0, gripper_jitter: 0.0, recovery_states: 0.0 }
+    }
+}
+
 /// Reads the task specification and the state (the paper's `f_TSE` and `f_ENC`).
 pub trait Encoder: Module + ModuleDisplay + Sync + Sized + 'static {
     /// Its widths, as they stand in a model's configuration.
@@ -53,23 +77,43 @@ pub trait Encoder: Module + ModuleDisplay + Sync + Sized + 'static {
     /// What it gives.
     fn widths(config: &Self::Config) -> Widths;
 
-    /// See [`super::Network::acquainted`].
-    #[must_use]
-    fn acquainted(self, _sample: &PictureSample, _seed: Seed) -> Self {
-        self
+    /// See [`super::Network::calibrated`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn calibrated(self, _sample: &PictureSample, _seed: Seed) -> Result<Self, ReadError> {
+        Ok(self)
     }
 
     /// See [`super::Network::perceive`].
-    fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn perceive(&self, pictures: &Pictures) -> Result<Self::Percepts, ReadError>;
 
     /// See [`super::Network::demonstration`].
-    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Self::Demonstration;
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Result<Self::Demonstration, ReadError>;
 
     /// See [`super::Network::window`].
     fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
 
     /// See [`super::Network::read`].
-    fn read(&self, demonstration: &Self::Demonstration, states: &[f32], percepts: &Self::Percepts) -> Self::Reading;
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn read(
+        &self,
+        demonstration: &Self::Demonstration,
+        states: &States,
+        percepts: &Self::Percepts,
+    ) -> Result<Self::Reading, ReadError>;
 
     /// The specification as a whole, `[B, context]`.
     fn context(reading: &Self::Reading) -> Tensor<2>;

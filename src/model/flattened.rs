@@ -7,35 +7,16 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, max_over_frames};
 use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
-use crate::model::vectors::{Positions, Vectors};
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
+use crate::model::vectors::{FlattenedConfig, Positions, Vectors};
 use crate::model::windows::{Padding, Windows};
 use crate::trace::Span;
-
-/// Widths of the flattened networks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FlattenedConfig {
-    /// Features of frames and states, and of every hidden layer. Default 96.
-    pub width: usize,
-    /// Width of program embeddings and keys. Default 32.
-    pub program_width: usize,
-    /// Frames that a scoping label sees around itself; odd. Default 5.
-    pub scope_kernel: usize,
-    /// Frames that an argument sees around itself; odd. Default 3.
-    pub argument_kernel: usize,
-}
-
-impl Default for FlattenedConfig {
-    fn default() -> Self {
-        Self { width: 96, program_width: 32, scope_kernel: 5, argument_kernel: 3 }
-    }
-}
 
 /// The paper's encoder of positions.
 pub type Flattened = FlatEncoder<Positions>;
@@ -88,7 +69,6 @@ impl SpecificationEncoder {
 /// Features of a demonstration.
 #[derive(Clone, Debug)]
 pub struct FlatDemonstration {
-    n_slots: usize,
     /// `[B, T, features]`
     frames: Tensor<3>,
     padding: Option<Padding>,
@@ -128,26 +108,31 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
         Widths { context: width, state: width, frame: width, program: program_width, core: vec![width, width] }
     }
 
-    fn perceive(&self, pictures: &Pictures) -> V::Percepts {
-        self.vectors.perceive(pictures)
+    fn perceive(&self, pictures: &Pictures) -> Result<V::Percepts, ReadError> {
+        Ok(self.vectors.perceive(pictures))
     }
 
-    fn demonstration(&self, windows: &Windows, percepts: &V::Percepts) -> FlatDemonstration {
+    fn demonstration(&self, windows: &Windows, percepts: &V::Percepts) -> Result<FlatDemonstration, ReadError> {
         let device = self.device();
-        let frames = V::of_windows(windows, percepts, &device);
-        FlatDemonstration { n_slots: windows.n_slots(), frames, padding: windows.padding(&device) }
+        let frames = V::of_windows(windows, percepts, &device)?;
+        Ok(FlatDemonstration { frames, padding: windows.padding(&device) })
     }
 
     fn window(demonstration: &FlatDemonstration, span: Span) -> FlatDemonstration {
         let frames = demonstration.frames.clone().narrow(1, span.begin as usize, span.len());
-        FlatDemonstration { n_slots: demonstration.n_slots, frames, padding: None }
+        FlatDemonstration { frames, padding: None }
     }
 
-    fn read(&self, demonstration: &FlatDemonstration, states: &[f32], percepts: &V::Percepts) -> FlatReading {
-        let FlatDemonstration { n_slots, frames, padding } = demonstration;
-        let states = V::of_states(states, *n_slots, percepts, &self.device());
+    fn read(
+        &self,
+        demonstration: &FlatDemonstration,
+        states: &States,
+        percepts: &V::Percepts,
+    ) -> Result<FlatReading, ReadError> {
+        let FlatDemonstration { frames, padding } = demonstration;
+        let state = self.state.forward(V::of_states(states, percepts, &self.device())?);
         let (convolved, summary) = self.specification.forward(frames.clone(), padding.as_ref());
-        FlatReading { demonstration: demonstration.clone(), convolved, summary, state: self.state.forward(states) }
+        Ok(FlatReading { demonstration: demonstration.clone(), convolved, summary, state })
     }
 
     fn context(reading: &FlatReading) -> Tensor<2> {
@@ -178,7 +163,7 @@ impl<V: Vectors> ArgumentDecoder<FlatEncoder<V>> for FlatArgument {
     }
 
     fn forward(&self, reading: &FlatReading, program: Tensor<2>, view: Tensor<2>, _hidden: Tensor<2>) -> Tensor<2> {
-        let FlatDemonstration { frames, padding, .. } = &reading.demonstration;
+        let FlatDemonstration { frames, padding } = &reading.demonstration;
         let (_, summary) = self.specification.forward(frames.clone(), padding.as_ref());
         self.slots.forward(self.hidden.forward(Tensor::cat(vec![summary, program, view], 1)))
     }

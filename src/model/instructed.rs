@@ -19,13 +19,16 @@ use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
-use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
+use crate::model::features::{self, AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::limits::{ConfigError, check_kernels, check_sizes};
 use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
-use crate::trace::{Span, Vocabulary};
+use crate::trace::{ObservationRows, Span, Vocabulary};
 
 /// Sharpens what a sentence means: a mixture of slots has no place.
 const REFERENT_GAIN: f32 = 8.0;
@@ -45,6 +48,14 @@ pub struct InstructedConfig {
 impl Default for InstructedConfig {
     fn default() -> Self {
         Self { width: 32, program_width: 16, scope_kernel: 5 }
+    }
+}
+
+impl InstructedConfig {
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        check_sizes(&[("width", self.width), ("program_width", self.program_width)])?;
+        check_kernels(&[("scope_kernel", self.scope_kernel)])
     }
 }
 
@@ -96,13 +107,13 @@ impl Instructed {
     }
 
     /// Where what is meant is, and how it lies to what the sentences before and after mean: `[B, T, places]`.
-    fn places(&self, sentences: &Sentences, states: Rows<'_>) -> Tensor<3> {
+    fn places(&self, sentences: &Sentences, states: &ObservationRows) -> Tensor<3> {
         let device = self.device();
         let meant = Self::meant(sentences);
         let [n_batch, n_frames, n_slots] = meant.dims();
-        let objects = TensorData::new(states.objects(), [n_batch, n_slots, OBJECT_WIDTH]);
+        let objects = TensorData::new(features::objects(states), [n_batch, n_slots, OBJECT_WIDTH]);
         let own = meant.clone().matmul(Tensor::<3>::from_data(objects, &device));
-        let pairs = TensorData::new(states.pairs(), [n_batch, n_slots, n_slots * POSITION_WIDTH]);
+        let pairs = TensorData::new(features::pairs(states), [n_batch, n_slots, n_slots * POSITION_WIDTH]);
         let from_own = meant.clone().matmul(Tensor::<3>::from_data(pairs, &device)); // [B, T, N * position]
         let from_own = from_own.reshape([n_batch, n_frames, n_slots, POSITION_WIDTH]);
         let to = |other: Tensor<3>| (from_own.clone() * other.unsqueeze_dim(3)).sum_dim(2).squeeze_dim::<3>(2);
@@ -140,17 +151,19 @@ impl Encoder for Instructed {
         Widths { context, state: width + AGENT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
-    fn perceive(&self, _pictures: &Pictures) {}
+    fn perceive(&self, _pictures: &Pictures) -> Result<(), ReadError> {
+        Ok(())
+    }
 
-    fn demonstration(&self, windows: &Windows, (): &()) -> Sentences {
+    fn demonstration(&self, windows: &Windows, (): &()) -> Result<Sentences, ReadError> {
         let n_words = Vocabulary::size(windows.n_slots());
         let shape = [windows.n_windows(), windows.n_frames(), n_words];
-        let words = Tensor::from_data(TensorData::new(windows.bags_of_words(n_words), shape), &self.device());
-        Sentences {
+        let words = Tensor::from_data(TensorData::new(windows.bags_of_words(n_words)?, shape), &self.device());
+        Ok(Sentences {
             referents: self.referent.forward(words.clone()) * REFERENT_GAIN,
             words: self.words.forward(words),
             padding: windows.padding(&self.device()),
-        }
+        })
     }
 
     fn window(sentences: &Sentences, span: Span) -> Sentences {
@@ -158,14 +171,14 @@ impl Encoder for Instructed {
         Sentences { words: cut(&sentences.words), referents: cut(&sentences.referents), padding: None }
     }
 
-    fn read(&self, sentences: &Sentences, states: &[f32], (): &()) -> InstructedReading {
+    fn read(&self, sentences: &Sentences, states: &States, (): &()) -> Result<InstructedReading, ReadError> {
         let padding = sentences.padding.as_ref();
-        let states = Rows { n_slots: sentences.referents.dims()[2], values: states };
+        let states = states.observations()?;
         let places = self.place.forward(self.places(sentences, states));
         let frames = relu(self.sentence.forward(relu(sentences.words.clone() + places)));
         let (frames, context) = summarize(&self.scope_conv, frames, padding);
         let state = state_with_gripper(&self.state, states, &self.scope_conv);
-        InstructedReading { sentences: sentences.clone(), frames, context, state }
+        Ok(InstructedReading { sentences: sentences.clone(), frames, context, state })
     }
 
     fn context(reading: &InstructedReading) -> Tensor<2> {

@@ -25,11 +25,15 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::convolution::Convolution;
+use crate::model::encoder::TrainingDefaults;
 pub use crate::model::keypoints::naming::GlimpseNaming;
 use crate::model::layers::Init;
+use crate::model::limits::{ConfigError, check_sizes};
 use crate::model::linear::Linear;
 use crate::model::perception::{Looks, Perception};
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::sighted::Naming;
 use crate::seed::Seed;
 
 /// Scores are this much sharper than a layer's outputs, so that heat has a place to begin with.
@@ -51,6 +55,14 @@ impl KeypointsConfig {
     /// The default widths.
     pub fn of(pixels: usize, slots: usize) -> Self {
         Self { pixels, slots, features: 32 }
+    }
+
+    /// Whether a network for `n_slots` slots can have these sizes.
+    pub(crate) fn check(&self, n_slots: usize) -> Result<(), ConfigError> {
+        let &Self { pixels, slots, features } = self;
+        check_sizes(&[("pixels", pixels), ("features", features)])?;
+        ConfigError::unless(features >= 2, "features", features, "at least 2, as the first layer has half of them")?;
+        ConfigError::unless(slots == n_slots, "slots", slots, "as many as n_slots")
     }
 }
 
@@ -100,6 +112,9 @@ impl Looks for CellLooks {
 }
 
 impl Keypoints {
+    /// Augmentations change positions; here there are pictures.
+    pub(crate) const TRAINING: TrainingDefaults = TrainingDefaults::plain(3000, 0.002);
+
     /// Fresh ones by themselves; the same seed gives the same parameters.
     pub fn fresh(config: &KeypointsConfig, seed: Seed, device: &Device) -> Self {
         Self::new(config, &mut Init::new(seed, device))
@@ -115,10 +130,13 @@ impl Keypoints {
     }
 }
 
+impl Naming for Keypoints {
+    type Decoder = GlimpseNaming;
+}
+
 impl Perception for Keypoints {
     type Config = KeypointsConfig;
     type Looks = CellLooks;
-    type Naming = GlimpseNaming;
 
     fn new(config: &KeypointsConfig, init: &mut Init) -> Self {
         let &KeypointsConfig { slots, features, .. } = config;
@@ -134,11 +152,11 @@ impl Perception for Keypoints {
         1 + config.slots
     }
 
-    fn acquainted(self, _sample: &PictureSample, _seed: Seed) -> Self {
-        self
+    fn calibrated(self, _sample: &PictureSample, _seed: Seed) -> Result<Self, ReadError> {
+        Ok(self)
     }
 
-    fn look(&self, pictures: &Pictures) -> (Tensor<3>, CellLooks) {
+    fn look(&self, pictures: &Pictures) -> Result<(Tensor<3>, CellLooks), ReadError> {
         let cells = self.cells(pictures);
         let [n, rows, columns, width] = cells.dims();
         let n_cells = rows * columns;
@@ -154,7 +172,7 @@ impl Perception for Keypoints {
         let presence = sigmoid(scores.clone().max_dim(1));
         let percepts = Tensor::cat(vec![centres, presence, (variances + 1e-4).sqrt()], 1).swap_dims(1, 2);
         let robot = percepts.clone().narrow(1, 0, 1).narrow(2, 0, 2).squeeze_dim(1);
-        (percepts, CellLooks { scores: scores.narrow(2, 1, n_points - 1), robot, rows, columns })
+        Ok((percepts, CellLooks { scores: scores.narrow(2, 1, n_points - 1), robot, rows, columns }))
     }
 }
 

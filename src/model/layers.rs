@@ -15,19 +15,25 @@ use crate::model::linear::Linear;
 use crate::program::KnownPrograms;
 use crate::seed::Seed;
 
-/// Draws parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
+/// Makes parameters one after another. Their ids count from 1, so that an optimizer's saved state finds them again in
 /// another process.
 pub struct Init {
     known: KnownPrograms,
-    rng: ChaCha8Rng,
+    /// What they are drawn from; `None` where they only have shapes, to be filled from a file.
+    rng: Option<ChaCha8Rng>,
     next_id: u64,
     device: Device,
 }
 
 impl Init {
     pub(crate) fn new(seed: Seed, device: &Device) -> Self {
-        let rng = seed.derive("parameters", &[]).rng();
-        Self { known: KnownPrograms::FIRST, rng, next_id: 1, device: device.clone() }
+        Self { rng: Some(seed.derive("parameters", &[]).rng()), ..Self::unfilled(device) }
+    }
+
+    /// Parameters of which nothing is made until a file fills them: whatever sizes it claims, they cost nothing before
+    /// its tensors are known to have them.
+    pub(crate) fn unfilled(device: &Device) -> Self {
+        Self { known: KnownPrograms::FIRST, rng: None, next_id: 1, device: device.clone() }
     }
 
     /// For a network that knows these programs.
@@ -42,19 +48,28 @@ impl Init {
 
     /// Uniform in `-bound..bound`.
     pub(crate) fn parameter<const D: usize>(&mut self, shape: [usize; D], bound: f32) -> Param<Tensor<D>> {
-        let values: Vec<f32> = (0..shape.iter().product()).map(|_| self.rng.random_range(-bound..bound)).collect();
-        let mut parameter = Param::from_data(TensorData::new(values, shape), &self.device);
-        parameter.id = ParamId::from(self.next_id);
-        self.next_id += 1;
-        parameter
+        self.made(shape, |rng, n| (0..n).map(|_| rng.random_range(-bound..bound)).collect())
     }
 
     /// Everywhere the same.
     pub(crate) fn filled<const D: usize>(&mut self, shape: [usize; D], value: f32) -> Param<Tensor<D>> {
-        let values = vec![value; shape.iter().product()];
-        let mut parameter = Param::from_data(TensorData::new(values, shape), &self.device);
-        parameter.id = ParamId::from(self.next_id);
+        self.made(shape, |_, n| vec![value; n])
+    }
+
+    fn made<const D: usize>(
+        &mut self,
+        shape: [usize; D],
+        values: impl FnOnce(&mut ChaCha8Rng, usize) -> Vec<f32>,
+    ) -> Param<Tensor<D>> {
+        let id = ParamId::from(self.next_id);
         self.next_id += 1;
+        let Some(rng) = &mut self.rng else {
+            let zeros = move |device: &Device, _requires_gradient| Tensor::zeros(shape, device);
+            return Param::uninitialized(id, zeros, self.device.clone(), true, shape.into());
+        };
+        let values = values(rng, shape.iter().product());
+        let mut parameter = Param::from_data(TensorData::new(values, shape), &self.device);
+        parameter.id = id;
         parameter
     }
 

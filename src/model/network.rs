@@ -3,17 +3,19 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::model::decisions::{Decisions, MAX_ARGUMENTS};
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::scoping_kind::{MAX_ARGUMENTS, ScopingKind};
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::seed::Seed;
-use crate::trace::Span;
+use crate::trace::{ObservationRows, Span};
 
 /// What a running program was called with where there is no specification to tell it; other variants do not read it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Given {
+pub struct CalledWith {
     /// For the root: which of the tasks that the model knows by name. `None` for any other.
     pub task: Option<usize>,
     /// The slots it was called with; none for the root.
@@ -42,8 +44,6 @@ pub struct CoreOutput {
 /// that have one, and so on; calls with more steps come first. `steps` says how many calls have each step, so it sums
 /// to `B`. For a network without memory `[B]` will do.
 pub trait Network: Module + Sync + 'static {
-    /// What is decided.
-    const DECISIONS: Decisions;
     /// Whether a decision depends on the steps before it in the same call.
     const IS_RECURRENT: bool;
 
@@ -57,36 +57,53 @@ pub trait Network: Module + Sync + 'static {
     /// What a running call remembers from one step to the next.
     type Recall: Clone + Send + Sync;
 
-    /// Settles what depends on what there is to see, before a first step of learning.
-    #[must_use]
-    fn acquainted(self, _sample: &PictureSample, _seed: Seed) -> Self {
-        self
+    /// What callees are given to see, and so what is decided.
+    fn scoping(&self) -> ScopingKind;
+
+    /// Finds the scene's colours and background before the first step of learning.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] when a tensor's numbers cannot be read.
+    fn calibrated(self, _sample: &PictureSample, _seed: Seed) -> Result<Self, ReadError> {
+        Ok(self)
     }
 
     /// Looks at pictures.
-    fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] when a tensor's numbers cannot be read.
+    fn perceive(&self, pictures: &Pictures) -> Result<Self::Percepts, ReadError>;
 
-    /// The observation rows that a detector found in the pictures, `[F, 3 N + 2]`; nothing where there is none.
-    fn detected(_percepts: &Self::Percepts) -> Option<&[f32]> {
+    /// The observations that a detector found in the pictures, a row each; nothing where there is none.
+    fn detected(_percepts: &Self::Percepts) -> Option<&ObservationRows> {
         None
     }
 
     /// The part that does not depend on the state: of every frame by itself, so that windows can be cut from it. With
-    /// pictures the rows of a window say which of the percepts it shows.
-    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Self::Demonstration;
+    /// pictures a window says which of the percepts it shows.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] for windows of a form that it does not read.
+    fn demonstration(&self, windows: &Windows, percepts: &Self::Percepts) -> Result<Self::Demonstration, ReadError>;
 
     /// The part of a single demonstration that a program may see.
     fn window(demonstration: &Self::Demonstration, span: Span) -> Self::Demonstration;
 
-    /// Encodes the demonstration and the state beside it. `states` are observation rows, or say which of the percepts
-    /// is seen now: one a window, and so is `given`.
+    /// Encodes the demonstration and the state beside it: one a window, and so is what each program was called with.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] for states that it does not read.
     fn read(
         &self,
         demonstration: &Self::Demonstration,
-        states: &[f32],
+        states: &States,
         percepts: &Self::Percepts,
-        given: &[Given],
-    ) -> Self::Reading;
+        called_with: &[CalledWith],
+    ) -> Result<Self::Reading, ReadError>;
 
     /// The next program and the end of the running one; and what the calls of the last step remember. A call's first
     /// step remembers nothing.
@@ -102,7 +119,7 @@ pub trait Network: Module + Sync + 'static {
     fn scope(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>>;
 
     /// Logits over the slots, a row for each of a decision's arguments: `[B * arguments, N]`, see
-    /// [`Decisions::n_arguments`].
+    /// [`ScopingKind::n_arguments`].
     fn argument(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Tensor<2>;
 
     /// Where the parameters are.

@@ -18,16 +18,18 @@ use burn::module::{Module, ModuleDisplay, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::core_network::{Core, LstmCore};
-use crate::model::decisions::Decisions;
 use crate::model::layers::{Init, repeat_row};
 use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
-use crate::model::network::{CoreOutput, Given, Network};
+use crate::model::network::{CalledWith, CoreOutput, Network};
 use crate::model::pictures::Pictures;
+use crate::model::read_error::ReadError;
+use crate::model::scoping_kind::ScopingKind;
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
 use crate::program::Program;
 use crate::seed::Seed;
-use crate::trace::Span;
+use crate::trace::{ObservationRows, Span};
 
 /// Reads the state and the slots that a program was called with, and names the slots that it calls another with.
 pub trait CallEncoder: Module + ModuleDisplay + Sync + Sized + 'static {
@@ -42,8 +44,8 @@ pub trait CallEncoder: Module + ModuleDisplay + Sync + Sized + 'static {
     /// Features of a hidden layer, and of program embeddings and keys.
     fn widths(config: &Self::Config) -> (usize, usize);
 
-    /// Observation rows and what each running program was called with.
-    fn read(&self, states: &[f32], given: &[Given]) -> Self::Reading;
+    /// Observations and what each running program was called with.
+    fn read(&self, states: &ObservationRows, called_with: &[CalledWith]) -> Self::Reading;
 
     /// All of it in one vector, `[B, H]`.
     fn state(reading: &Self::Reading) -> Tensor<2>;
@@ -102,16 +104,16 @@ impl<E: CallEncoder> Npi<E> {
     }
 
     /// The rows of tasks; zeros for a call that is no task's root, and for a task that is not known.
-    fn task_rows(&self, given: &[Given]) -> Tensor<2> {
+    fn task_rows(&self, called_with: &[CalledWith]) -> Tensor<2> {
         let device = self.device();
         let n_tasks = self.tasks.dims()[0];
-        let mut chosen = vec![0.0_f32; given.len() * n_tasks];
-        for (row, given) in chosen.chunks_exact_mut(n_tasks).zip(given) {
-            if let Some(weight) = given.task.and_then(|task| row.get_mut(task)) {
+        let mut chosen = vec![0.0_f32; called_with.len() * n_tasks];
+        for (row, call) in chosen.chunks_exact_mut(n_tasks).zip(called_with) {
+            if let Some(weight) = call.task.and_then(|task| row.get_mut(task)) {
                 *weight = 1.0;
             }
         }
-        let chosen = Tensor::<2>::from_data(TensorData::new(chosen, [given.len(), n_tasks]), &device);
+        let chosen = Tensor::<2>::from_data(TensorData::new(chosen, [called_with.len(), n_tasks]), &device);
         chosen.matmul(self.tasks.val())
     }
 
@@ -122,7 +124,6 @@ impl<E: CallEncoder> Npi<E> {
 }
 
 impl<E: CallEncoder> Network for Npi<E> {
-    const DECISIONS: Decisions = Decisions::Arguments;
     const IS_RECURRENT: bool = LstmCore::IS_RECURRENT;
 
     type Percepts = ();
@@ -130,14 +131,23 @@ impl<E: CallEncoder> Network for Npi<E> {
     type Reading = NpiReading<E::Reading>;
     type Recall = <LstmCore as Core>::Recall;
 
-    fn perceive(&self, _pictures: &Pictures) {}
+    fn scoping(&self) -> ScopingKind {
+        ScopingKind::Arguments
+    }
 
-    fn demonstration(&self, _windows: &Windows, (): &()) {}
+    fn perceive(&self, _pictures: &Pictures) -> Result<(), ReadError> {
+        Ok(())
+    }
+
+    fn demonstration(&self, _windows: &Windows, (): &()) -> Result<(), ReadError> {
+        Ok(())
+    }
 
     fn window((): &(), _span: Span) {}
 
-    fn read(&self, (): &(), states: &[f32], (): &(), given: &[Given]) -> Self::Reading {
-        NpiReading { calls: self.encoder.read(states, given), tasks: self.task_rows(given) }
+    fn read(&self, (): &(), states: &States, (): &(), called_with: &[CalledWith]) -> Result<Self::Reading, ReadError> {
+        let calls = self.encoder.read(states.observations()?, called_with);
+        Ok(NpiReading { calls, tasks: self.task_rows(called_with) })
     }
 
     fn core(
@@ -166,12 +176,12 @@ impl<E: CallEncoder> Network for Npi<E> {
 }
 
 /// One where a slot is an argument: `[B, N, MAX_ARGUMENTS]`.
-fn flags(given: &[Given], n_slots: usize) -> Vec<f32> {
-    let slots = |given: &Given| {
-        let arguments = given.arguments;
+fn flags(called_with: &[CalledWith], n_slots: usize) -> Vec<f32> {
+    let slots = |call: &CalledWith| {
+        let arguments = call.arguments;
         (0..n_slots).flat_map(move |slot| {
             arguments.map(|argument| f32::from(u8::from(argument.is_some_and(|named| usize::from(named.0) == slot))))
         })
     };
-    given.iter().flat_map(slots).collect()
+    called_with.iter().flat_map(slots).collect()
 }

@@ -21,14 +21,17 @@ use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
-use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
-use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH, Rows};
+use crate::model::encoder::{ArgumentDecoder, Encoder, TrainingDefaults, Widths};
+use crate::model::features::{self, AGENT_WIDTH, OBJECT_WIDTH, POSITION_WIDTH};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::limits::{ConfigError, check_kernels, check_sizes};
 use crate::model::linear::Linear;
 use crate::model::pictures::Pictures;
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
 use crate::model::summary::{state_with_gripper, summarize};
 use crate::model::windows::{Padding, Windows};
-use crate::trace::Span;
+use crate::trace::{ObservationRows, Span};
 
 /// Widths of the object-centric networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,6 +52,15 @@ pub struct ObjectCentricConfig {
 impl Default for ObjectCentricConfig {
     fn default() -> Self {
         Self { pair_width: 12, width: 32, program_width: 16, scope_kernel: 5, argument_kernel: 3 }
+    }
+}
+
+impl ObjectCentricConfig {
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let &Self { pair_width, width, program_width, scope_kernel, argument_kernel } = self;
+        check_sizes(&[("pair_width", pair_width), ("width", width), ("program_width", program_width)])?;
+        check_kernels(&[("scope_kernel", scope_kernel), ("argument_kernel", argument_kernel)])
     }
 }
 
@@ -100,19 +112,24 @@ pub struct ObjectReading {
 }
 
 impl ObjectCentric {
+    /// Relabelling changes nothing for it. It learns from jittered grippers and from what was knocked over at once.
+    pub(crate) const TRAINING: TrainingDefaults =
+        TrainingDefaults { gripper_jitter: 0.2, recovery_states: 0.25, ..TrainingDefaults::plain(1000, 0.003) };
+
     /// Each slot in each frame, compared with its pairs and itself now: `[B, T, N, H]`.
-    fn compare(&self, demonstration: &ObjectDemonstration, states: Rows<'_>) -> Tensor<4> {
+    fn compare(&self, demonstration: &ObjectDemonstration, states: &ObservationRows) -> Tensor<4> {
         let device = self.device();
         let ObjectDemonstration { pairs, objects, padding: _ } = demonstration;
         let [n_batch, n_frames, n_slots, _] = objects.dims();
         let now = [n_batch, 1, n_slots * n_slots, POSITION_WIDTH];
-        let pairs_now = self.pair_state.forward(Tensor::<4>::from_data(TensorData::new(states.pairs(), now), &device));
+        let pairs_now =
+            self.pair_state.forward(Tensor::<4>::from_data(TensorData::new(features::pairs(states), now), &device));
         let compared = self.pair.forward(relu(pairs.clone() + pairs_now)); // [B, T, N * N, pair]
         let n_pair = compared.dims()[3];
         let relations = compared.reshape([n_batch * n_frames, n_slots, n_slots, n_pair]).max_dim(2); // [B * T, N, 1, pair]
         let relations = relations.reshape([n_batch, n_frames, n_slots, n_pair]);
         let now = [n_batch, 1, n_slots, OBJECT_WIDTH];
-        let objects_now = Tensor::<4>::from_data(TensorData::new(states.objects(), now), &device);
+        let objects_now = Tensor::<4>::from_data(TensorData::new(features::objects(states), now), &device);
         let hidden = self.object_pairs.forward(relations) + objects.clone() + self.object_state.forward(objects_now);
         relu(self.object.forward(relu(hidden)))
     }
@@ -148,18 +165,20 @@ impl Encoder for ObjectCentric {
         Widths { context, state: width + AGENT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
-    fn perceive(&self, _pictures: &Pictures) {}
+    fn perceive(&self, _pictures: &Pictures) -> Result<(), ReadError> {
+        Ok(())
+    }
 
-    fn demonstration(&self, windows: &Windows, (): &()) -> ObjectDemonstration {
-        let device = self.device();
+    fn demonstration(&self, windows: &Windows, (): &()) -> Result<ObjectDemonstration, ReadError> {
+        let (device, rows) = (self.device(), windows.observations()?);
         let (n_batch, n_frames, n_slots) = (windows.n_windows(), windows.n_frames(), windows.n_slots());
-        let pairs = TensorData::new(windows.rows().pairs(), [n_batch, n_frames, n_slots * n_slots, POSITION_WIDTH]);
-        let objects = TensorData::new(windows.rows().objects(), [n_batch, n_frames, n_slots, OBJECT_WIDTH]);
-        ObjectDemonstration {
+        let pairs = TensorData::new(features::pairs(rows), [n_batch, n_frames, n_slots * n_slots, POSITION_WIDTH]);
+        let objects = TensorData::new(features::objects(rows), [n_batch, n_frames, n_slots, OBJECT_WIDTH]);
+        Ok(ObjectDemonstration {
             pairs: self.pair_demonstration.forward(Tensor::from_data(pairs, &device)),
             objects: self.object_demonstration.forward(Tensor::from_data(objects, &device)),
             padding: windows.padding(&device),
-        }
+        })
     }
 
     fn window(demonstration: &ObjectDemonstration, span: Span) -> ObjectDemonstration {
@@ -167,18 +186,18 @@ impl Encoder for ObjectCentric {
         ObjectDemonstration { pairs: cut(&demonstration.pairs), objects: cut(&demonstration.objects), padding: None }
     }
 
-    fn read(&self, demonstration: &ObjectDemonstration, states: &[f32], (): &()) -> ObjectReading {
+    fn read(&self, demonstration: &ObjectDemonstration, states: &States, (): &()) -> Result<ObjectReading, ReadError> {
         let padding = demonstration.padding.as_ref();
-        let states = Rows { n_slots: demonstration.objects.dims()[2], values: states };
+        let states = states.observations()?;
         let objects = self.compare(demonstration, states);
         let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
-        ObjectReading {
+        Ok(ObjectReading {
             objects,
             frames,
             context,
             state: state_with_gripper(&self.state, states, &self.scope_conv),
             padding: demonstration.padding.clone(),
-        }
+        })
     }
 
     fn context(reading: &ObjectReading) -> Tensor<2> {

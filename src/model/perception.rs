@@ -5,10 +5,9 @@ use std::fmt::Debug;
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Int, Tensor};
 
-use crate::model::encoder::ArgumentDecoder;
 use crate::model::layers::Init;
 use crate::model::pictures::{PictureSample, Pictures};
-use crate::model::sighted::Sighted;
+use crate::model::read_error::ReadError;
 use crate::seed::Seed;
 
 /// x, y, mass and spread of a percept.
@@ -20,8 +19,6 @@ pub trait Perception: Module + ModuleDisplay + Sync + Sized + 'static {
     type Config: Copy;
     /// What is kept of each picture besides, for naming objects: `()` where places are all.
     type Looks: Looks;
-    /// How an object is named by what is found.
-    type Naming: ArgumentDecoder<Sighted<Self>>;
 
     /// A fresh one.
     fn new(config: &Self::Config, init: &mut Init) -> Self;
@@ -29,9 +26,12 @@ pub trait Perception: Module + ModuleDisplay + Sync + Sized + 'static {
     /// How many things it finds in a picture.
     fn n_percepts(config: &Self::Config) -> usize;
 
-    /// See [`super::Network::acquainted`].
-    #[must_use]
-    fn acquainted(self, sample: &PictureSample, seed: Seed) -> Self;
+    /// See [`super::Network::calibrated`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    fn calibrated(self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError>;
 
     /// Finds them.
     ///
@@ -39,7 +39,11 @@ pub trait Perception: Module + ModuleDisplay + Sync + Sized + 'static {
     ///
     /// `F` pictures → `[F, K, 4]`: x and y from -1 to 1 across and down the picture, mass (how much of it is there)
     /// and spread (in the unit of x). The robot is the first of the `K`.
-    fn look(&self, pictures: &Pictures) -> (Tensor<3>, Self::Looks);
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] when a tensor's numbers cannot be read.
+    fn look(&self, pictures: &Pictures) -> Result<(Tensor<3>, Self::Looks), ReadError>;
 }
 
 /// What is kept of pictures beside the places of percepts.

@@ -1,8 +1,13 @@
 //! What a network that sees is given to look at.
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Int, Tensor, TensorData};
 
+use crate::model::read_error::ReadError;
 use crate::trace::GripperState;
+
+/// Which of some pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PictureIndex(pub u32);
 
 /// Colour pictures of one size, side by side.
 ///
@@ -73,6 +78,24 @@ impl Pictures {
     pub fn n_bytes(&self) -> usize {
         self.width * self.height * 3
     }
+}
+
+/// Rows of percepts by the pictures that they are of.
+///
+/// # Errors
+///
+/// [`ReadError::Picture`] for one beyond the `n_pictures` that were shown.
+pub(crate) fn picked(
+    pictures: &[PictureIndex],
+    n_pictures: usize,
+    device: &Device,
+) -> Result<Tensor<1, Int>, ReadError> {
+    if let Some(beyond) = pictures.iter().find(|picture| picture.0 as usize >= n_pictures) {
+        return Err(ReadError::Picture { found: beyond.0, n: n_pictures });
+    }
+    let numbers: Vec<i32> = pictures.iter().map(|picture| picture.0 as i32).collect();
+    let n = numbers.len();
+    Ok(Tensor::from_data(TensorData::new(numbers, [n]), device))
 }
 
 /// Mean of the channels, 0 to 1.

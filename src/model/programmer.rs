@@ -9,20 +9,22 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use crate::model::core_network::{Core, GruCore, Reactive};
-use crate::model::decisions::Decisions;
 use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
 use crate::model::layers::{Init, repeat_row};
 use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
-use crate::model::network::{CoreOutput, Given, Network};
+use crate::model::network::{CalledWith, CoreOutput, Network};
 use crate::model::pictures::{PictureSample, Pictures};
-use crate::model::scoping::{NoHierarchy, ScopeHead, Scoping, WholeSpecification};
+use crate::model::read_error::ReadError;
+use crate::model::scoping::ScopeHead;
+use crate::model::scoping_kind::ScopingKind;
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
 use crate::program::Program;
 use crate::seed::Seed;
 use crate::trace::Span;
 
-/// An encoder, a treatment of windows, a core and an argument decoder, put together.
+/// An encoder, a scoping, a core and an argument decoder, put together.
 ///
 /// # Shapes
 ///
@@ -38,45 +40,43 @@ use crate::trace::Span;
 /// `view` is the state, or the hidden vector of a recurrent core, whose `B` steps of calls are packed as
 /// [`Network`] says.
 #[derive(Module, Debug)]
-pub struct Programmer<E: Module, S: Module, C: Module, A: Module> {
+pub struct Programmer<E: Module, C: Module, A: Module> {
     encoder: E,
-    scope: S,
+    /// Where callees are given a part of the specification.
+    scope: Option<ScopeHead>,
     core: C,
     key_and_end: Linear,
     memory: ProgramMemory,
     argument: A,
+    #[module(skip)]
+    scoping: ScopingKind,
 }
 
-/// `ntp`: reactive, scoped.
-pub type Ntp<E> = Programmer<E, ScopeHead, Reactive, <E as Encoder>::Argument>;
-/// `ntp_gru`: recurrent, scoped.
-pub type NtpGru<E> = Programmer<E, ScopeHead, GruCore, <E as Encoder>::Argument>;
-/// `ntp_no_scope`: reactive, every program sees the whole specification.
-pub type NtpNoScope<E> = Programmer<E, WholeSpecification, Reactive, <E as Encoder>::Argument>;
-/// `flat`: reactive, primitives alone.
-pub type Flat<E> = Programmer<E, NoHierarchy, Reactive, <E as Encoder>::Argument>;
-/// `flat_gru`: recurrent, primitives alone.
-pub type FlatGru<E> = Programmer<E, NoHierarchy, GruCore, <E as Encoder>::Argument>;
+/// With a reactive core: `ntp`, `ntp_no_scope`, `flat`.
+pub type Ntp<E> = Programmer<E, Reactive, <E as Encoder>::Argument>;
+/// With a recurrent one: `ntp_gru`, `flat_gru`.
+pub type NtpGru<E> = Programmer<E, GruCore, <E as Encoder>::Argument>;
 
-impl<E: Encoder, S: Scoping, C: Core> Programmer<E, S, C, E::Argument> {
-    /// A fresh network for scenes of `n_slots` slots; the same seed gives the same parameters.
+impl<E: Encoder, C: Core> Programmer<E, C, E::Argument> {
+    /// A fresh scoped network for scenes of `n_slots` slots; the same seed gives the same parameters.
     pub fn new(config: &E::Config, n_slots: usize, seed: Seed, device: &Device) -> Self {
-        Self::drawn(config, n_slots, &mut Init::new(seed, device))
+        Self::drawn(ScopingKind::Scoped, config, n_slots, &mut Init::new(seed, device))
     }
 
-    /// The same with parameters drawn after others.
-    pub(crate) fn drawn(config: &E::Config, n_slots: usize, init: &mut Init) -> Self {
+    /// The same of a scoping that gives callees a specification, with parameters drawn after others.
+    pub(crate) fn drawn(scoping: ScopingKind, config: &E::Config, n_slots: usize, init: &mut Init) -> Self {
         let widths = E::widths(config);
         let Widths { context, state, frame, program, core: layers } = &widths;
         let n_hidden = widths.hidden();
         let n_view = C::view_width(*state, n_hidden);
         Self {
             encoder: E::new(config, n_slots, init),
-            scope: S::new(init, *frame, program + n_view, n_hidden),
+            scope: scoping.has_scopes().then(|| ScopeHead::new(init, *frame, program + n_view, n_hidden)),
             core: C::new(init, context + program + state, layers),
             key_and_end: init.linear(n_hidden, program + 1),
             memory: ProgramMemory::new(init, *program),
             argument: E::Argument::new(config, n_slots, n_view, init),
+            scoping,
         }
     }
 
@@ -86,8 +86,7 @@ impl<E: Encoder, S: Scoping, C: Core> Programmer<E, S, C, E::Argument> {
     }
 }
 
-impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argument> {
-    const DECISIONS: Decisions = S::DECISIONS;
+impl<E: Encoder, C: Core> Network for Programmer<E, C, E::Argument> {
     const IS_RECURRENT: bool = C::IS_RECURRENT;
 
     type Percepts = E::Percepts;
@@ -95,16 +94,20 @@ impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argumen
     type Reading = E::Reading;
     type Recall = C::Recall;
 
-    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
-        self.encoder = self.encoder.acquainted(sample, seed);
-        self
+    fn scoping(&self) -> ScopingKind {
+        self.scoping
     }
 
-    fn perceive(&self, pictures: &Pictures) -> E::Percepts {
+    fn calibrated(mut self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError> {
+        self.encoder = self.encoder.calibrated(sample, seed)?;
+        Ok(self)
+    }
+
+    fn perceive(&self, pictures: &Pictures) -> Result<E::Percepts, ReadError> {
         self.encoder.perceive(pictures)
     }
 
-    fn demonstration(&self, windows: &Windows, percepts: &E::Percepts) -> E::Demonstration {
+    fn demonstration(&self, windows: &Windows, percepts: &E::Percepts) -> Result<E::Demonstration, ReadError> {
         self.encoder.demonstration(windows, percepts)
     }
 
@@ -115,10 +118,10 @@ impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argumen
     fn read(
         &self,
         demonstration: &E::Demonstration,
-        states: &[f32],
+        states: &States,
         percepts: &E::Percepts,
-        _given: &[Given],
-    ) -> E::Reading {
+        _called_with: &[CalledWith],
+    ) -> Result<E::Reading, ReadError> {
         self.encoder.read(demonstration, states, percepts)
     }
 
@@ -139,7 +142,8 @@ impl<E: Encoder, S: Scoping, C: Core> Network for Programmer<E, S, C, E::Argumen
     fn scope(&self, reading: &E::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>> {
         let view = C::view(E::state(reading), core.hidden.clone());
         let program = self.program(program, view.dims()[0]);
-        self.scope.labels(E::frames(reading), Tensor::cat(vec![program, view], 1))
+        let head = self.scope.as_ref()?;
+        Some(head.forward(E::frames(reading), Tensor::cat(vec![program, view], 1)))
     }
 
     fn argument(&self, reading: &E::Reading, program: Program, core: &CoreOutput) -> Tensor<2> {

@@ -19,16 +19,18 @@
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::activation::{leaky_relu, relu};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
+use crate::model::limits::{ConfigError, check_kernels, check_sizes};
 use crate::model::linear::Linear;
 use crate::model::perception::{Looks as _, PERCEPT_WIDTH, Perception};
-use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::pictures::{PictureIndex, PictureSample, Pictures, picked};
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
 use crate::model::summary::summarize;
-use crate::model::vectors::picked;
 use crate::model::windows::{Padding, Windows};
 use crate::seed::Seed;
 use crate::trace::Span;
@@ -73,6 +75,13 @@ impl<P> SightedConfig<P> {
     pub fn of(perception: P) -> Self {
         Self { perception, pair_width: 12, width: 32, program_width: 16, scope_kernel: 5, argument_kernel: 3 }
     }
+
+    /// Whether a network can have these sizes, those of the perception aside.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let &Self { perception: _, pair_width, width, program_width, scope_kernel, argument_kernel } = self;
+        check_sizes(&[("pair_width", pair_width), ("width", width), ("program_width", program_width)])?;
+        check_kernels(&[("scope_kernel", scope_kernel), ("argument_kernel", argument_kernel)])
+    }
 }
 
 /// The encoder of videos.
@@ -89,6 +98,12 @@ pub struct Sighted<P: Module> {
     object: Linear,
     state: Mlp,
     scope_conv: TemporalConv,
+}
+
+/// A perception whose finds are given the names of slots.
+pub trait Naming: Perception {
+    /// How an object is named by what is found.
+    type Decoder: ArgumentDecoder<Sighted<Self>>;
 }
 
 /// Names an object by what the specification and the state show of every percept: which percept is which object nobody
@@ -124,8 +139,10 @@ pub struct SightedDemonstration<L> {
     padding: Option<Padding>,
     /// Of all pictures.
     looks: L,
+    /// How many these are.
+    n_pictures: usize,
     /// The pictures that each window shows.
-    shown: Vec<Vec<i32>>,
+    shown: Vec<Vec<PictureIndex>>,
 }
 
 /// Demonstration and state, compared.
@@ -163,12 +180,12 @@ impl<P: Perception> Sighted<P> {
     }
 }
 
-impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
+impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
     type Config = SightedConfig<P::Config>;
     type Percepts = Percepts<P::Looks>;
     type Demonstration = SightedDemonstration<P::Looks>;
     type Reading = SightedReading<P::Looks>;
-    type Argument = P::Naming;
+    type Argument = P::Decoder;
 
     fn new(config: &Self::Config, _n_slots: usize, init: &mut Init) -> Self {
         let &SightedConfig { perception, pair_width, width, scope_kernel, .. } = config;
@@ -194,13 +211,13 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
         Widths { context, state: width + PERCEPT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
-    fn acquainted(mut self, sample: &PictureSample, seed: Seed) -> Self {
-        self.perception = self.perception.acquainted(sample, seed);
-        self
+    fn calibrated(mut self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError> {
+        self.perception = self.perception.calibrated(sample, seed)?;
+        Ok(self)
     }
 
-    fn perceive(&self, pictures: &Pictures) -> Percepts<P::Looks> {
-        let (seen, looks) = self.perception.look(pictures); // [F, K, PERCEPT_WIDTH]
+    fn perceive(&self, pictures: &Pictures) -> Result<Percepts<P::Looks>, ReadError> {
+        let (seen, looks) = self.perception.look(pictures)?; // [F, K, PERCEPT_WIDTH]
         let [n_pictures, n_percepts, _] = seen.dims();
         let places = seen.clone().narrow(2, 0, 2);
         let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
@@ -214,38 +231,45 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
         let hidden = self.object_seen.forward(objects.clone());
         let state: Tensor<2> = self.state.forward(objects).max_dim(1).squeeze_dim(1);
         let robot = robots.narrow(1, 0, 1).squeeze_dim(1);
-        Percepts {
+        Ok(Percepts {
             pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
             objects: [self.object_demonstration.forward(hidden.clone()), self.object_state.forward(hidden)],
             states: Tensor::cat(vec![state, robot], 1),
             looks,
-        }
+        })
     }
 
-    fn demonstration(&self, windows: &Windows, percepts: &Percepts<P::Looks>) -> SightedDemonstration<P::Looks> {
+    fn demonstration(
+        &self,
+        windows: &Windows,
+        percepts: &Percepts<P::Looks>,
+    ) -> Result<SightedDemonstration<P::Looks>, ReadError> {
         let device = self.device();
-        let shown = picked(windows.picture_rows(), &device);
+        let n_pictures = percepts.states.dims()[0];
+        let shown = picked(windows.pictures()?, n_pictures, &device)?;
         let gather = |all: &Tensor<3>| {
             let [_, n_inner, width] = all.dims();
             all.clone().select(0, shown.clone()).reshape([windows.n_windows(), windows.n_frames(), n_inner, width])
         };
-        SightedDemonstration {
+        Ok(SightedDemonstration {
             pairs: gather(&percepts.pairs[0]),
             objects: gather(&percepts.objects[0]),
             padding: windows.padding(&device),
             looks: percepts.looks.clone(),
-            shown: windows.pictures(),
-        }
+            n_pictures,
+            shown: windows.shown()?.into_iter().map(<[_]>::to_vec).collect(),
+        })
     }
 
     fn window(demonstration: &SightedDemonstration<P::Looks>, span: Span) -> SightedDemonstration<P::Looks> {
         let cut = |frames: &Tensor<4>| frames.clone().narrow(1, span.begin as usize, span.len());
-        let shown = |window: &Vec<i32>| window[span.begin as usize..span.end as usize].to_vec();
+        let shown = |window: &Vec<PictureIndex>| window[span.begin as usize..span.end as usize].to_vec();
         SightedDemonstration {
             pairs: cut(&demonstration.pairs),
             objects: cut(&demonstration.objects),
             padding: None,
             looks: demonstration.looks.clone(),
+            n_pictures: demonstration.n_pictures,
             shown: demonstration.shown.iter().map(shown).collect(),
         }
     }
@@ -253,22 +277,24 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
     fn read(
         &self,
         demonstration: &SightedDemonstration<P::Looks>,
-        states: &[f32],
+        states: &States,
         percepts: &Percepts<P::Looks>,
-    ) -> SightedReading<P::Looks> {
-        let now = picked(states, &self.device());
+    ) -> Result<SightedReading<P::Looks>, ReadError> {
+        let device = self.device();
+        let now = picked(states.pictures()?, percepts.states.dims()[0], &device)?;
         let pairs_now = percepts.pairs[1].clone().select(0, now.clone());
         let objects_now = percepts.objects[1].clone().select(0, now.clone());
         let objects = self.compare(demonstration, pairs_now, objects_now);
         let padding = demonstration.padding.as_ref();
         let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
         let state = percepts.states.clone().select(0, now);
-        let device = self.device();
-        let ends = [<[i32]>::first, <[i32]>::last].map(|end| {
-            let shown: Vec<i32> = demonstration.shown.iter().map(|window| end(window).copied().unwrap_or(0)).collect();
-            demonstration.looks.select(Tensor::from_data(TensorData::new(shown, [demonstration.shown.len()]), &device))
-        });
-        SightedReading { objects, frames, context, state, padding: demonstration.padding.clone(), ends }
+        let end = |end: fn(&[PictureIndex]) -> Option<&PictureIndex>| -> Result<P::Looks, ReadError> {
+            let shown: Vec<PictureIndex> =
+                demonstration.shown.iter().map(|window| end(window).copied().unwrap_or_default()).collect();
+            Ok(demonstration.looks.select(picked(&shown, demonstration.n_pictures, &device)?))
+        };
+        let ends = [end(<[_]>::first)?, end(<[_]>::last)?];
+        Ok(SightedReading { objects, frames, context, state, padding: demonstration.padding.clone(), ends })
     }
 
     fn context(reading: &SightedReading<P::Looks>) -> Tensor<2> {
@@ -288,7 +314,7 @@ impl<P: Perception + ModuleDisplay> Encoder for Sighted<P> {
     }
 }
 
-impl<P: Perception> ArgumentDecoder<Sighted<P>> for PerceptNaming {
+impl<P: Naming> ArgumentDecoder<Sighted<P>> for PerceptNaming {
     fn new(config: &SightedConfig<P::Config>, n_slots: usize, _n_view: usize, init: &mut Init) -> Self {
         let &SightedConfig { perception, width, program_width, argument_kernel, .. } = config;
         let n_context = program_width + width;

@@ -7,18 +7,19 @@
 
 use std::path::{Path, PathBuf};
 
-use burn::module::Module;
-use burn::store::{ModuleSnapshot as _, SafetensorsStore};
-use burn::tensor::Device;
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::store::{ModuleSnapshot as _, ModuleStore as _, SafetensorsStore};
+use burn::tensor::{DType, Device, Tensor};
 use serde::Serialize;
 
 use crate::artifact::{self, IoError};
-use crate::model::build::{NetworkUse, with_network};
+use crate::model::build::{NetworkUse, build};
 use crate::model::config::ModelConfig;
+use crate::model::layers::Init;
+use crate::model::limits::ConfigError;
 use crate::model::network::Network;
-use crate::model::variant::Variant;
+use crate::model::values::values;
 use crate::program::KnownPrograms;
-use crate::seed::Seed;
 
 /// Name of the resolved configuration in a model's folder.
 pub const CONFIG_FILE: &str = "config.json";
@@ -49,11 +50,11 @@ pub enum ModelError {
         /// The file.
         path: PathBuf,
     },
-    /// Variant and widths do not belong together.
-    #[error("model configuration has widths that are not those of variant {variant}: {}", path.display())]
-    Network {
-        /// As found.
-        variant: Variant,
+    /// No network can be made of `config.json`.
+    #[error("model configuration cannot be used: {problem}: {}", path.display())]
+    Config {
+        /// Which key, what was found and what is allowed.
+        problem: ConfigError,
         /// The file.
         path: PathBuf,
     },
@@ -97,12 +98,65 @@ pub fn weights_to_bytes(network: &impl Module, path: &Path) -> Result<Vec<u8>, M
 ///
 /// [`ModelError::Weights`] when the bytes are not exactly this network's; `path` is for the message alone.
 pub fn weights_from_bytes<M: Module>(mut network: M, bytes: Vec<u8>, path: &Path) -> Result<M, ModelError> {
-    let problem = |problem: String| ModelError::Weights { problem, path: path.into() };
-    let mut store = SafetensorsStore::from_bytes(Some(bytes));
-    let applied = network.load_from(&mut store).map_err(|error| problem(error.to_string()))?;
+    match fill(&mut network, bytes).and_then(|()| check_numbers(&network)) {
+        Ok(()) => Ok(network),
+        Err(problem) => Err(ModelError::Weights { problem, path: path.into() }),
+    }
+}
+
+/// Fills the parameters of a network, each of them and with nothing left over.
+fn fill<M: Module>(network: &mut M, bytes: Vec<u8>) -> Result<(), String> {
+    // What is wrong is told below, tensor by tensor.
+    let mut store = SafetensorsStore::from_bytes(Some(bytes)).validate(false).allow_partial(true);
+    let tensors = store.get_all_tensors().map_err(|error| error.to_string())?;
+    if let Some(other) = tensors.values().find(|tensor| tensor.dtype != DType::F32) {
+        return Err(format!("tensor {:?} is of {:?}; allowed is F32", other.name, other.dtype));
+    }
+    let applied = network.load_from(&mut store).map_err(|error| error.to_string())?;
+    if let Some(error) = applied.errors.first() {
+        return Err(error.to_string());
+    }
+    if let Some((name, _)) = applied.missing.first() {
+        return Err(format!("tensor {name:?} is missing"));
+    }
     match applied.unused.first() {
-        Some(name) => Err(problem(format!("tensor {name:?} is not one of the network's"))),
-        None => Ok(network),
+        Some(name) => Err(format!("tensor {name:?} is not one of the network's")),
+        None => Ok(()),
+    }
+}
+
+/// Refuses parameters that are no numbers: whatever is decided by them is decided by default.
+fn check_numbers(network: &impl Module) -> Result<(), String> {
+    let mut numbers = Numbers { path: Vec::new(), wrong: None };
+    network.visit(&mut numbers);
+    numbers.wrong.map_or(Ok(()), Err)
+}
+
+/// Looks for the first parameter that is no number.
+struct Numbers {
+    path: Vec<String>,
+    wrong: Option<String>,
+}
+
+impl ModuleVisitor for Numbers {
+    fn enter_module(&mut self, name: &str, _container: &str) {
+        self.path.push(name.to_owned());
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.pop();
+    }
+
+    fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+        let name = || self.path.join(".");
+        let wrong = match values(parameter.val()) {
+            Err(error) => Some(format!("tensor {:?}: {error}", name())),
+            Ok(numbers) => numbers
+                .iter()
+                .position(|number| !number.is_finite())
+                .map(|at| format!("tensor {:?} has {} at {at}; allowed are finite numbers", name(), numbers[at])),
+        };
+        self.wrong = self.wrong.take().or(wrong);
     }
 }
 
@@ -110,7 +164,7 @@ pub fn weights_from_bytes<M: Module>(mut network: M, bytes: Vec<u8>, path: &Path
 ///
 /// # Errors
 ///
-/// When it is not there, not readable, or of another version or vocabulary.
+/// When it is not there, not readable, of another version or vocabulary, or nothing that a network can be made of.
 pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
     let path = folder.join(CONFIG_FILE);
     let config: ModelConfig = artifact::read_json(&path)?;
@@ -120,10 +174,10 @@ pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
     if KnownPrograms::of_hash(&config.vocabulary).is_none() {
         return Err(ModelError::Vocabulary { found: config.vocabulary, expected: KnownPrograms::ALL.hash(), path });
     }
-    if !config.network.is_for(config.variant) {
-        return Err(ModelError::Network { variant: config.variant, path });
+    match config.check() {
+        Ok(()) => Ok(config),
+        Err(problem) => Err(ModelError::Config { problem, path }),
     }
-    Ok(config)
 }
 
 /// Refuses a model that was made for something else than what is asked for.
@@ -159,7 +213,9 @@ fn pixels(config: &ModelConfig) -> String {
 pub fn load<U: NetworkUse>(folder: &Path, config: &ModelConfig, wanted: U) -> Result<U::Output, ModelError> {
     let path = folder.join(WEIGHTS_FILE);
     let bytes = artifact::read(&path)?;
-    with_network(config, Seed(0), &Device::flex(), Loading { bytes, path: &path, wanted })
+    let loading = Loading { bytes, path: &path, wanted };
+    build(config, &mut Init::unfilled(&Device::flex()).knowing(config.programs()), loading)
+        .unwrap_or_else(|problem| Err(ModelError::Config { problem, path: folder.join(CONFIG_FILE) }))
 }
 
 /// Gives a network its stored weights before it is used.

@@ -2,9 +2,10 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::model::features::{AGENT_WIDTH, OBJECT_WIDTH, Rows};
+use crate::model::features::{self, AGENT_WIDTH, OBJECT_WIDTH};
 use crate::model::layers::{Mlp, TemporalConv, max_over_frames};
 use crate::model::windows::Padding;
+use crate::trace::ObservationRows;
 
 /// Each frame with its neighbours, `[B, T, H]` and zero beyond a window; and the most and last of the window,
 /// `[B, 2 H]`.
@@ -21,11 +22,11 @@ pub(crate) fn summarize(conv: &TemporalConv, frames: Tensor<3>, padding: Option<
 }
 
 /// The state, in which slots have no order, with the gripper: `[B, H + AGENT_WIDTH]`.
-pub(crate) fn state_with_gripper(slots: &Mlp, states: Rows<'_>, conv: &TemporalConv) -> Tensor<2> {
+pub(crate) fn state_with_gripper(slots: &Mlp, states: &ObservationRows, conv: &TemporalConv) -> Tensor<2> {
     let device = conv.device();
-    let (objects, agents) = (states.objects(), states.agents());
-    let n_batch = agents.len() / AGENT_WIDTH;
-    let objects = TensorData::new(objects, [n_batch, states.n_slots, OBJECT_WIDTH]);
+    let (objects, agents) = (features::objects(states), features::agents(states));
+    let n_batch = states.len();
+    let objects = TensorData::new(objects, [n_batch, states.n_slots(), OBJECT_WIDTH]);
     let state = slots.forward(Tensor::<3>::from_data(objects, &device)).max_dim(1).squeeze_dim(1);
     let agents = TensorData::new(agents, [n_batch, AGENT_WIDTH]);
     Tensor::cat(vec![state, Tensor::from_data(agents, &device)], 1)

@@ -2,15 +2,47 @@
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::activation::relu;
-use burn::tensor::{Device, Int, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::convolution::Convolution;
-use crate::model::features::{Rows, flat_width};
-use crate::model::flattened::FlattenedConfig;
+use crate::model::encoder::TrainingDefaults;
+use crate::model::features::{self, flat_width};
 use crate::model::layers::Init;
-use crate::model::pictures::Pictures;
+use crate::model::limits::{ConfigError, check_kernels, check_sizes};
+use crate::model::pictures::{Pictures, picked};
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
+
+/// Widths of the flattened networks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlattenedConfig {
+    /// Features of frames and states, and of every hidden layer. Default 96.
+    pub width: usize,
+    /// Width of program embeddings and keys. Default 32.
+    pub program_width: usize,
+    /// Frames that a scoping label sees around itself; odd. Default 5.
+    pub scope_kernel: usize,
+    /// Frames that an argument sees around itself; odd. Default 3.
+    pub argument_kernel: usize,
+}
+
+impl Default for FlattenedConfig {
+    fn default() -> Self {
+        Self { width: 96, program_width: 32, scope_kernel: 5, argument_kernel: 3 }
+    }
+}
+
+impl FlattenedConfig {
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let &Self { width, program_width, scope_kernel, argument_kernel } = self;
+        check_sizes(&[("width", width), ("program_width", program_width)])?;
+        check_kernels(&[("scope_kernel", scope_kernel), ("argument_kernel", argument_kernel)])
+    }
+}
 
 /// Makes vectors.
 pub trait Vectors: Module + ModuleDisplay + Sync + Sized + 'static {
@@ -32,15 +64,30 @@ pub trait Vectors: Module + ModuleDisplay + Sync + Sized + 'static {
     fn perceive(&self, pictures: &Pictures) -> Self::Percepts;
 
     /// Of each frame of windows, `[B, T, features]`.
-    fn of_windows(windows: &Windows, percepts: &Self::Percepts, device: &Device) -> Tensor<3>;
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] for windows of another form.
+    fn of_windows(windows: &Windows, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<3>, ReadError>;
 
     /// Of each state, `[B, features]`.
-    fn of_states(states: &[f32], n_slots: usize, percepts: &Self::Percepts, device: &Device) -> Tensor<2>;
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`] for states of another form.
+    fn of_states(states: &States, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<2>, ReadError>;
 }
 
 /// All slots' positions side by side.
 #[derive(Module, Debug)]
 pub struct Positions;
+
+impl Positions {
+    /// Slots have parameters of their own, so every label must have been every slot. Jittered grippers and what was
+    /// knocked over keep it from learning in this budget.
+    pub(crate) const TRAINING: TrainingDefaults =
+        TrainingDefaults { relabel_slots: 1.0, ..TrainingDefaults::plain(3000, 0.002) };
+}
 
 impl Vectors for Positions {
     type Config = FlattenedConfig;
@@ -60,15 +107,15 @@ impl Vectors for Positions {
 
     fn perceive(&self, _pictures: &Pictures) {}
 
-    fn of_windows(windows: &Windows, (): &(), device: &Device) -> Tensor<3> {
+    fn of_windows(windows: &Windows, (): &(), device: &Device) -> Result<Tensor<3>, ReadError> {
         let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots())];
-        Tensor::from_data(TensorData::new(windows.rows().flat(), shape), device)
+        Ok(Tensor::from_data(TensorData::new(features::flat(windows.observations()?), shape), device))
     }
 
-    fn of_states(states: &[f32], n_slots: usize, (): &(), device: &Device) -> Tensor<2> {
-        let features = Rows { n_slots, values: states }.flat();
-        let shape = [features.len() / flat_width(n_slots), flat_width(n_slots)];
-        Tensor::from_data(TensorData::new(features, shape), device)
+    fn of_states(states: &States, (): &(), device: &Device) -> Result<Tensor<2>, ReadError> {
+        let rows = states.observations()?;
+        let shape = [rows.len(), flat_width(rows.n_slots())];
+        Ok(Tensor::from_data(TensorData::new(features::flat(rows), shape), device))
     }
 }
 
@@ -89,6 +136,12 @@ impl ConvolvedConfig {
     pub fn of_pixels(pixels: usize) -> Self {
         Self { pixels, features: 128, flattened: FlattenedConfig::default() }
     }
+
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        check_sizes(&[("pixels", self.pixels), ("features", self.features)])?;
+        self.flattened.check()
+    }
 }
 
 /// Channels and stride of each layer but the last, which has [`ConvolvedConfig::features`] and covers what is left.
@@ -103,6 +156,11 @@ const LAYERS: [(usize, usize); 6] = [(16, 2), (24, 1), (32, 2), (48, 2), (64, 2)
 #[derive(Module, Debug)]
 pub struct Convolved {
     layers: Vec<Convolution>,
+}
+
+impl Convolved {
+    /// Augmentations change positions; here there are pictures.
+    pub(crate) const TRAINING: TrainingDefaults = TrainingDefaults::plain(3000, 0.001);
 }
 
 impl Vectors for Convolved {
@@ -134,20 +192,14 @@ impl Vectors for Convolved {
         seen.flatten(1, 3)
     }
 
-    fn of_windows(windows: &Windows, percepts: &Tensor<2>, device: &Device) -> Tensor<3> {
-        let features = percepts.clone().select(0, picked(windows.picture_rows(), device));
-        let width = features.dims()[1];
-        features.reshape([windows.n_windows(), windows.n_frames(), width])
+    fn of_windows(windows: &Windows, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<3>, ReadError> {
+        let [n_pictures, width] = percepts.dims();
+        let features = percepts.clone().select(0, picked(windows.pictures()?, n_pictures, device)?);
+        Ok(features.reshape([windows.n_windows(), windows.n_frames(), width]))
     }
 
-    fn of_states(states: &[f32], _n_slots: usize, percepts: &Tensor<2>, device: &Device) -> Tensor<2> {
-        percepts.clone().select(0, picked(states, device))
+    fn of_states(states: &States, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<2>, ReadError> {
+        let n_pictures = percepts.dims()[0];
+        Ok(percepts.clone().select(0, picked(states.pictures()?, n_pictures, device)?))
     }
-}
-
-/// Rows as numbers of pictures.
-pub(crate) fn picked(rows: &[f32], device: &Device) -> Tensor<1, Int> {
-    let numbers: Vec<i32> = rows.iter().map(|&row| row as i32).collect();
-    let n = numbers.len();
-    Tensor::from_data(TensorData::new(numbers, [n]), device)
 }

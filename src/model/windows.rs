@@ -2,8 +2,10 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::model::features::Rows;
-use crate::trace::{MAX_WORDS, Observation};
+use crate::model::pictures::PictureIndex;
+use crate::model::read_error::ReadError;
+use crate::model::specification_rows::SpecificationRows;
+use crate::trace::{ObservationRows, Words};
 
 /// A score that no softmax lets through.
 const HIDDEN_SCORE: f32 = 1e4;
@@ -14,23 +16,39 @@ pub struct Windows {
     n_slots: usize,
     n_frames: usize,
     lengths: Vec<usize>,
-    rows: Vec<f32>,
+    /// `[windows * frames]`
+    rows: SpecificationRows,
 }
 
 impl Windows {
-    /// Stacks windows, each of observation rows of `n_slots` slots.
-    pub fn new(n_slots: usize, windows: &[&[f32]]) -> Self {
-        Self::stack(n_slots, Observation::width(n_slots), windows)
-    }
-
-    fn stack(n_slots: usize, width: usize, windows: &[&[f32]]) -> Self {
-        let lengths: Vec<usize> = windows.iter().map(|window| window.len() / width).collect();
+    /// Stacks windows of scenes with `n_slots` slots, all of the first one's form.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError::Form`] when one is of another form.
+    pub fn new(n_slots: usize, windows: &[&SpecificationRows]) -> Result<Self, ReadError> {
+        let lengths: Vec<usize> = windows.iter().map(|window| window.len()).collect();
         let n_frames = lengths.iter().copied().max().unwrap_or(0);
-        let mut rows = vec![0.0; windows.len() * n_frames * width];
-        for (window, padded) in windows.iter().zip(rows.chunks_exact_mut((n_frames * width).max(1))) {
-            padded[..window.len()].copy_from_slice(window);
-        }
-        Self { n_slots, n_frames, lengths, rows }
+        let rows = match windows.first() {
+            None => SpecificationRows::Pictures(Vec::new()),
+            Some(SpecificationRows::Observations(_)) => {
+                let mut rows = ObservationRows::new(n_slots, Vec::new());
+                for window in windows {
+                    rows.append(window.observations()?);
+                    (window.len()..n_frames).for_each(|_| rows.push_nothing());
+                }
+                SpecificationRows::Observations(rows)
+            }
+            Some(SpecificationRows::Sentences(_)) => {
+                let windows = windows.iter().map(|window| window.sentences()).collect::<Result<Vec<_>, _>>()?;
+                SpecificationRows::Sentences(padded(&windows, n_frames))
+            }
+            Some(SpecificationRows::Pictures(_)) => {
+                let windows = windows.iter().map(|window| window.pictures()).collect::<Result<Vec<_>, _>>()?;
+                SpecificationRows::Pictures(padded(&windows, n_frames))
+            }
+        };
+        Ok(Self { n_slots, n_frames, lengths, rows })
     }
 
     /// How many windows.
@@ -48,50 +66,40 @@ impl Windows {
         self.n_slots
     }
 
-    /// Stacks windows of instructions: rows of [`crate::trace::Words`], as numbers.
-    pub fn of_instructions(n_slots: usize, windows: &[&[f32]]) -> Self {
-        Self::stack(n_slots, MAX_WORDS, windows)
+    /// The same frames with observations in the place of the pictures that they show.
+    pub(crate) fn with_observations(
+        &self,
+        rows: impl Fn(&[PictureIndex]) -> Result<ObservationRows, ReadError>,
+    ) -> Result<Self, ReadError> {
+        let shown = self.shown()?.into_iter().map(|pictures| Ok(SpecificationRows::Observations(rows(pictures)?)));
+        let shown: Vec<SpecificationRows> = shown.collect::<Result<_, ReadError>>()?;
+        Self::new(self.n_slots, &shown.iter().collect::<Vec<_>>())
     }
 
-    /// Stacks windows of a video: rows of one number each, which says which of some percepts the frame shows.
-    pub fn of_pictures(n_slots: usize, windows: &[&[f32]]) -> Self {
-        Self::stack(n_slots, 1, windows)
+    /// Row by row, `[windows * frames]`; zeros beyond a window.
+    pub(crate) fn observations(&self) -> Result<&ObservationRows, ReadError> {
+        self.rows.observations()
     }
 
-    /// The same frames with other rows for the pictures that they show.
-    pub(crate) fn with_rows(&self, width: usize, rows: impl Fn(&[f32]) -> Vec<f32>) -> Self {
-        let windows = self.rows.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);
-        let shown: Vec<Vec<f32>> = windows.map(|(pictures, &length)| rows(&pictures[..length])).collect();
-        let slices: Vec<&[f32]> = shown.iter().map(Vec::as_slice).collect();
-        Self::stack(self.n_slots, width, &slices)
+    /// The picture of each frame, `[windows * frames]`; the first beyond a window.
+    pub(crate) fn pictures(&self) -> Result<&[PictureIndex], ReadError> {
+        self.rows.pictures()
     }
 
-    /// The number of each frame's picture, `[windows * frames]`; zero beyond a window.
-    pub(crate) fn picture_rows(&self) -> &[f32] {
-        &self.rows
-    }
-
-    /// The numbers of the pictures that each window shows, without padding.
-    pub(crate) fn pictures(&self) -> Vec<Vec<i32>> {
-        let windows = self.rows.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);
-        windows.map(|(rows, &length)| rows[..length].iter().map(|&row| row as i32).collect()).collect()
+    /// The pictures that each window shows, without padding.
+    pub(crate) fn shown(&self) -> Result<Vec<&[PictureIndex]>, ReadError> {
+        let windows = self.pictures()?.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);
+        Ok(windows.map(|(pictures, &length)| &pictures[..length]).collect())
     }
 
     /// Which words of a vocabulary of `n_words` each sentence has: `[windows * frames, n_words]`.
-    pub(crate) fn bags_of_words(&self, n_words: usize) -> Vec<f32> {
-        let mut bags = vec![0.0; self.rows.len() / MAX_WORDS * n_words];
-        for (sentence, bag) in self.rows.chunks_exact(MAX_WORDS).zip(bags.chunks_exact_mut(n_words)) {
-            for &word in sentence.iter().filter(|word| **word > 0.0) {
-                if let Some(has) = bag.get_mut(word as usize) {
-                    *has = 1.0;
-                }
-            }
+    pub(crate) fn bags_of_words(&self, n_words: usize) -> Result<Vec<f32>, ReadError> {
+        let sentences = self.rows.sentences()?;
+        let mut bags = vec![0.0; sentences.len() * n_words];
+        for (sentence, bag) in sentences.iter().zip(bags.chunks_exact_mut(n_words.max(1))) {
+            fill_bag(sentence, bag);
         }
-        bags
-    }
-
-    pub(crate) fn rows(&self) -> Rows<'_> {
-        Rows { n_slots: self.n_slots, values: &self.rows }
+        Ok(bags)
     }
 
     /// The masks; nothing when no window is padded.
@@ -105,6 +113,21 @@ impl Windows {
             };
             Padding { valid: column(|t, length| t < length), last: column(|t, length| t + 1 == length) }
         })
+    }
+}
+
+/// Windows one after another, each with nothing behind it up to the longest.
+fn padded<T: Copy + Default>(windows: &[&[T]], n_frames: usize) -> Vec<T> {
+    let padding = |window: &[T]| std::iter::repeat_n(T::default(), n_frames - window.len());
+    windows.iter().flat_map(|window| window.iter().copied().chain(padding(window))).collect()
+}
+
+/// One for each word of a sentence; the empty word is none.
+fn fill_bag(sentence: &Words, bag: &mut [f32]) {
+    for &word in sentence.iter().filter(|word| **word > 0) {
+        if let Some(has) = bag.get_mut(usize::from(word)) {
+            *has = 1.0;
+        }
     }
 }
 

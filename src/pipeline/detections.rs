@@ -2,7 +2,7 @@
 //! picture by picture, and is compared with the world.
 
 use crate::render::{CameraConfig, Visibility};
-use crate::rollout::{Acted, Detected, DetectionRows, Policy, Start};
+use crate::rollout::{Acted, Detected, DetectionRows, Policy, PolicyError, Start};
 use crate::seed::Seed;
 
 /// Of a suite, all shards together.
@@ -16,12 +16,13 @@ pub(super) fn of_starts(
     by: &Acted,
     camera: &CameraConfig,
     starts: &[Start<'_>],
-) -> Option<DetectionRows> {
+) -> Result<Option<DetectionRows>, PolicyError> {
     let mut rows = DetectionRows::default();
     let mut visibility = Visibility::default();
     for start in starts {
         let demonstration = &start.demonstration;
-        let found = policy.detect(&start.sight.as_ref()?.video)?;
+        let Some(sight) = &start.sight else { return Ok(None) };
+        let Some(found) = policy.detect(&sight.video)? else { return Ok(None) };
         let camera = camera.camera(demonstration.provenance.family, Seed(demonstration.provenance.seed));
         let frames = demonstration.boundary_frames();
         let shares: Vec<Vec<f64>> =
@@ -30,5 +31,5 @@ pub(super) fn of_starts(
             Detected { episode: start.provenance.index, demonstration, rows: &found, visible_shares: &shares };
         rows.push(policy.name(), suite, by, &detected);
     }
-    Some(rows)
+    Ok(Some(rows))
 }

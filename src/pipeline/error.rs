@@ -7,6 +7,7 @@ use crate::dataset::{ConvertError, DatasetError};
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
+use crate::rollout::RolloutError;
 use crate::sim::SimError;
 use crate::table::TableError;
 use crate::task::{ImportError, SampleError, TaskFileError, TaskSetError};
@@ -74,6 +75,14 @@ pub enum PipelineError {
         trial: u32,
         /// The rule.
         source: TraceError,
+    },
+    /// A suite's episodes cannot be acted.
+    #[error("{unit}: {source}")]
+    Rollout {
+        /// What was under way.
+        unit: String,
+        /// Why not.
+        source: RolloutError,
     },
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]

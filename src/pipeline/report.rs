@@ -136,7 +136,7 @@ fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, 
         let spec = &context.pipeline.spec.models[model];
         let model = ModelSummary {
             experiment: context.pipeline.spec.name.clone(),
-            variant: spec.variant.name().to_owned(),
+            variant: spec.variant.name(),
             parts: parts(ModelFacts::from(spec.variant)),
             tag: spec.tag.clone(),
             train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),

@@ -20,8 +20,8 @@ use crate::progress::Progress;
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
-    self, Acted, DetectionRows, Limits, ModelFacts, Oracle, Policy, RolloutEpisode, RolloutRows, Sight, Start,
-    load_policy,
+    self, Acted, DetectionRows, Limits, ModelFacts, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows, Sight,
+    Start, load_policy,
 };
 use crate::seed::Seed;
 use crate::sim::Simulation;
@@ -176,7 +176,7 @@ impl Learned {
         let mut wanted =
             ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
         if let Some(camera) = context.pipeline.spec.generate.cameras.first() {
-            wanted.network = wanted.network.seeing(camera.size_px[0] as usize, wanted.n_slots);
+            wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, wanted.n_slots);
         }
         check_purpose(&found, &wanted, &self.folder)?;
         Ok(load_policy(&self.folder, self.decoder)?.1)
@@ -262,7 +262,7 @@ impl Suite<'_> {
         let starts = starts?;
         let mut policy = self.policy(&starts)?;
         let by = self.learned.as_ref().map(|learned| learned.acted.clone()).unwrap_or_default();
-        let detections = self.detections(policy.as_ref(), &by, &starts);
+        let detections = self.detections(policy.as_ref(), &by, &starts)?;
         let acted = self.act(policy.as_mut(), starts)?;
         let part = format!("{PART}{shard:05}.parquet");
         RolloutRows::of(&spec.name, &facts::of_suite(&context.pipeline.spec, spec), &by, &acted)
@@ -340,20 +340,27 @@ impl Suite<'_> {
     }
 
     /// The errors of a detector, which are the same whatever decodes what is behind it.
-    fn detections(&self, policy: &dyn Policy, by: &Acted, starts: &[Start<'_>]) -> Option<DetectionRows> {
-        self.learned.as_ref().filter(|learned| learned.variant.detects() && learned.is_first)?;
-        let camera = self.context.pipeline.spec.generate.cameras.first()?;
-        detections::of_starts(policy, &self.spec.name, by, camera, starts)
+    fn detections(
+        &self,
+        policy: &dyn Policy,
+        by: &Acted,
+        starts: &[Start<'_>],
+    ) -> Result<Option<DetectionRows>, PipelineError> {
+        let detects = self.learned.as_ref().is_some_and(|learned| learned.variant.detects() && learned.is_first);
+        let Some(camera) = self.context.pipeline.spec.generate.cameras.first().filter(|_| detects) else {
+            return Ok(None);
+        };
+        detections::of_starts(policy, &self.spec.name, by, camera, starts).map_err(|error| self.failed(error.into()))
+    }
+
+    fn failed(&self, source: RolloutError) -> PipelineError {
+        PipelineError::Rollout { unit: self.unit.name.clone(), source }
     }
 
     fn act(&self, policy: &mut dyn Policy, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
         let factor = self.context.pipeline.spec.rollout.decisions_factor;
         let limits = Limits { decisions_factor: factor, ..Limits::default() };
-        rollout::run(policy, starts, limits).map_err(|source| PipelineError::Trace {
-            task_id: self.unit.name.clone(),
-            trial: 0,
-            source,
-        })
+        rollout::run(policy, starts, limits).map_err(|source| self.failed(source))
     }
 
     /// Records the first episodes of the suite, and the shard's first failures, which are not seen otherwise.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::ConvertConfig;
-use crate::model::{Decoder, Variant};
+use crate::model::{CoreKind, Decoder, EncoderKind, ScopingKind, Variant};
 use crate::render::CameraConfig;
 use crate::sim::{AdversaryConfig, SimulationConfig};
 use crate::task::{Family, Split, TaskPool};
@@ -123,7 +123,7 @@ impl Default for GenerateSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSpec {
-    /// Which model.
+    /// Which model: a variant's name, or its parts `{ core, scoping, encoder }`.
     pub variant: Variant,
     /// What tells it apart from other models of its variant that are trained otherwise: letters, digits, `_` and `-`.
     /// The report shows it beside the variant's name, and leaves tagged models out of the paper's figures and claims.
@@ -150,6 +150,21 @@ pub struct ModelSpec {
 }
 
 impl ModelSpec {
+    /// What its running programs decide from.
+    pub fn core(&self) -> CoreKind {
+        self.variant.core()
+    }
+
+    /// What its callees are given to see.
+    pub fn scoping(&self) -> ScopingKind {
+        self.variant.scoping()
+    }
+
+    /// How it reads observations and demonstrations.
+    pub fn encoder(&self) -> EncoderKind {
+        self.variant.encoder()
+    }
+
     /// What it reads as task specification.
     pub fn specification(&self) -> SpecificationForm {
         self.variant.specification(self.specification)

@@ -66,7 +66,7 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
     };
     let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &|| context.go_on().is_err() };
     let gallery = gallery.as_ref().map(|gallery| gallery as &dyn Gallery);
-    let summary = training::train_seeing(&training, &trials, gallery, unit.dir.path(), &mut hooks);
+    let summary = training::train_on_pictures(&training, &trials, gallery, unit.dir.path(), &mut hooks);
     context.go_on()?;
     let summary = summary?;
     let files: Result<Vec<FileEntry>, IoError> =
@@ -79,7 +79,11 @@ pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineErr
         files: files?,
     })?;
     unit.dir.commit(&unit.plan, &[])?;
-    progress.finish(&format!("{} steps, {} examples", summary.steps, summary.examples));
+    let dropped = match summary.dropped_gradients {
+        0 => String::new(),
+        n => format!(", {n} gradients that were no numbers left out"),
+    };
+    progress.finish(&format!("{} steps, {} examples{dropped}", summary.steps, summary.examples));
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::rollout::Acted;
 use crate::scene::{BodyIndex, Mobility, Scene};
 use crate::table::{TableError, TableRows as _, table};
-use crate::trace::{Episode, Observation};
+use crate::trace::{Episode, ObservationRows};
 
 /// One row a movable body and boundary frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,8 +47,8 @@ pub struct Detected<'d> {
     pub episode: u64,
     /// What was shown.
     pub demonstration: &'d Episode,
-    /// An observation row for each boundary frame.
-    pub rows: &'d [f32],
+    /// What it found in each boundary frame.
+    pub rows: &'d ObservationRows,
     /// The visible share of each body in each boundary frame.
     pub visible_shares: &'d [Vec<f64>],
 }
@@ -58,12 +58,11 @@ impl DetectionRows {
     pub fn push(&mut self, variant: &str, suite: &str, by: &Acted, detected: &Detected<'_>) {
         let Detected { episode, demonstration, rows, visible_shares } = *detected;
         let scene = &demonstration.scene;
-        let width = Observation::width(scene.slots.len());
-        let frames = demonstration.boundary_frames().zip(rows.chunks_exact(width)).zip(visible_shares).enumerate();
+        let frames = demonstration.boundary_frames().zip(rows.iter()).zip(visible_shares).enumerate();
         for (frame, (((_, recorded), found), shares)) in frames {
             let truth = recorded.observation();
             for (slot, body) in movable_slots(scene) {
-                let error = |axis: usize| f64::from(found[3 * slot + axis]) - f64::from(truth.slots_m[slot][axis]);
+                let error = |axis: usize| f64::from(found.positions[slot][axis]) - f64::from(truth.slots_m[slot][axis]);
                 self.rows.push(Row {
                     variant: variant.into(),
                     suite: suite.into(),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::model::Decisions;
+use crate::model::ScopingKind;
 use crate::program::Program;
 use crate::scene::{Scene, SlotIndex};
 use crate::trace::{CallId, Episode, ProgramCall, Span};
@@ -84,12 +84,12 @@ pub fn expected_calls<'d>(demonstration: &'d Episode, scene: &Scene) -> Vec<&'d 
 }
 
 /// What of the expert's calls a policy is expected to decide; the whole of the specification is `whole`.
-pub(super) fn decided_of(decisions: Decisions, whole: Option<Span>, calls: &[ProgramCall]) -> Vec<ProgramCall> {
+pub(super) fn decided_of(scoping: ScopingKind, whole: Option<Span>, calls: &[ProgramCall]) -> Vec<ProgramCall> {
     let unscoped = |call: ProgramCall| ProgramCall { output: call.output.and(whole), ..call };
-    match decisions {
-        Decisions::Scoped => calls.to_vec(),
-        Decisions::Unscoped | Decisions::Arguments => calls.iter().cloned().map(unscoped).collect(),
-        Decisions::Primitives => {
+    match scoping {
+        ScopingKind::Scoped => calls.to_vec(),
+        ScopingKind::Unscoped | ScopingKind::Arguments => calls.iter().cloned().map(unscoped).collect(),
+        ScopingKind::Primitives => {
             let end_of_program = |call: &ProgramCall| call.program == Program::None;
             let decided = calls.iter().filter(|call| !call.program.is_composite());
             decided.map(|call| ProgramCall { end_of_program: end_of_program(call), ..call.clone() }).collect()

@@ -12,7 +12,7 @@
 
 use std::collections::VecDeque;
 
-use crate::model::Decisions;
+use crate::model::ScopingKind;
 use crate::rollout::divergence::decided_of;
 use crate::rollout::expected_calls;
 use crate::scene::{BodyIndex, Scene, SlotIndex};
@@ -48,7 +48,7 @@ struct Stacked {
 
 impl Expectation {
     /// For repeating a demonstration in a scene, by a policy that decides so much.
-    pub fn new(decisions: Decisions, demonstration: &Episode, scene: &Scene) -> Self {
+    pub fn new(scoping: ScopingKind, demonstration: &Episode, scene: &Scene) -> Self {
         let family = demonstration.provenance.family;
         let mut sub_tasks: Vec<SubTask> = Vec::new();
         for call in expected_calls(demonstration, scene) {
@@ -62,7 +62,7 @@ impl Expectation {
         }
         let whole = demonstration.calls.first().and_then(|root| root.output);
         for sub_task in &mut sub_tasks {
-            sub_task.calls = decided_of(decisions, whole, &sub_task.calls);
+            sub_task.calls = decided_of(scoping, whole, &sub_task.calls);
         }
         Self { sub_tasks, ..Self::default() }
     }

@@ -1,6 +1,6 @@
 //! What a suite and a model are, as columns of `rollouts.parquet`: no reader takes it from their names.
 
-use crate::model::{Architecture, EncoderKind, Variant};
+use crate::model::Variant;
 use crate::scene::{Mobility, Scene};
 use crate::task::Family;
 
@@ -54,23 +54,7 @@ pub struct ModelFacts {
 
 impl From<Variant> for ModelFacts {
     fn from(variant: Variant) -> Self {
-        let (core, scoping) = match variant.architecture() {
-            Architecture::Ntp => ("reactive", "scoped"),
-            Architecture::NtpGru => ("gru", "scoped"),
-            Architecture::NtpNoScope => ("reactive", "unscoped"),
-            Architecture::Flat => ("reactive", "primitives"),
-            Architecture::FlatGru => ("gru", "primitives"),
-            Architecture::Npi => ("lstm", "arguments"),
-        };
-        let encoder = match variant.encoder() {
-            EncoderKind::ObjectCentric => "object_centric",
-            EncoderKind::Flattened => "flattened",
-            EncoderKind::ColourSlots => "colour_slots",
-            EncoderKind::Convolved => "convolved",
-            EncoderKind::Keypoints => "keypoints",
-            EncoderKind::Detected => "detected",
-            EncoderKind::DetectedFlattened => "detected_flattened",
-        };
+        let [core, scoping, encoder] = [variant.core().name(), variant.scoping().name(), variant.encoder().name()];
         Self { core, scoping, encoder }
     }
 }

@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefMutIterator as _, ParallelIterator as _};
 
-use crate::model::{Decisions, Pictures};
+use crate::model::{Pictures, ScopingKind};
 use crate::program::Program;
 use crate::robot::{Action, Judgement, RobotApi, judge};
 use crate::rollout::divergence::divergence;
-use crate::rollout::{Decision, Divergence, Expectation, Policy, Query, Specification};
+use crate::rollout::{Decision, Divergence, Expectation, Policy, PolicyError, Query, Specification};
 use crate::scene::Scene;
 use crate::task::Task;
 use crate::trace::{
@@ -83,28 +83,47 @@ pub struct RolloutEpisode {
     pub judgement: Judgement,
 }
 
+/// Episodes that cannot be acted.
+#[derive(Debug, thiserror::Error)]
+pub enum RolloutError {
+    /// The policy could not decide.
+    #[error(transparent)]
+    Policy(#[from] PolicyError),
+    /// An episode breaks a rule of traces: a bug in world or policy.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+}
+
 /// Acts all episodes to their ends. Physics of different episodes runs on the current rayon pool; the result does not
 /// depend on its size.
 ///
 /// # Errors
 ///
-/// [`TraceError`] when an episode breaks a rule of traces: a bug in world or policy.
-pub fn run(policy: &mut dyn Policy, starts: Vec<Start<'_>>, limits: Limits) -> Result<Vec<RolloutEpisode>, TraceError> {
+/// [`RolloutError`] when the policy cannot decide, or when an episode breaks a rule of traces.
+pub fn run(
+    policy: &mut dyn Policy,
+    starts: Vec<Start<'_>>,
+    limits: Limits,
+) -> Result<Vec<RolloutEpisode>, RolloutError> {
     let mut running: Vec<Running<'_>> =
-        starts.into_iter().map(|start| Running::new(start, policy.decides(), policy.reads(), limits)).collect();
+        starts.into_iter().map(|start| Running::new(start, policy.scoping(), policy.reads(), limits)).collect();
     loop {
         let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
         if queries.is_empty() {
             break;
         }
-        let decisions = policy.decide(&queries);
+        let decisions = policy.decide(&queries)?;
+        if decisions.len() != queries.len() {
+            let (policy, found) = (policy.name().to_owned(), decisions.len());
+            return Err(PolicyError::Count { policy, found, expected: queries.len() }.into());
+        }
         for (query, decision) in queries.iter().zip(decisions) {
             running[query.episode].pending = Some(decision);
         }
         running.par_iter_mut().for_each(Running::step);
     }
     let variant = policy.name().to_owned();
-    running.into_iter().map(|run| run.finish(&variant)).collect()
+    Ok(running.into_iter().map(|run| run.finish(&variant)).collect::<Result<_, TraceError>>()?)
 }
 
 /// One episode on its way.
@@ -130,11 +149,10 @@ struct Running<'t> {
 }
 
 impl<'t> Running<'t> {
-    fn new(start: Start<'t>, decisions: Decisions, reads: SpecificationForm, limits: Limits) -> Self {
+    fn new(start: Start<'t>, scoping: ScopingKind, reads: SpecificationForm, limits: Limits) -> Self {
         let Start { task, demonstration, world, sight, provenance } = start;
         let demonstration = demonstration.boundaries_only();
-        let expectation =
-            Expectation::new(decisions, &demonstration, world.scene()).specified_in(reads, &demonstration);
+        let expectation = Expectation::new(scoping, &demonstration, world.scene()).specified_in(reads, &demonstration);
         let (video, mut eye) = sight.map(|sight| (sight.video, sight.eye)).unzip();
         let specification = match video {
             Some(video) if reads == SpecificationForm::Video => Specification::video(&demonstration, video),
@@ -243,7 +261,7 @@ impl<'t> Running<'t> {
             provenance: self.provenance,
             scene: self.world.scene().clone(),
             frames: self.world.frames().to_vec(),
-            specification_frames: self.specification.n_frames as u32,
+            specification_frames: self.specification.whole().end,
             calls,
             pushes: self.world.pushes().unwrap_or_default().to_vec(),
             outcome,

@@ -18,13 +18,13 @@ use rayon::iter::{
 };
 
 use crate::model::{
-    self, CoreOutput, Decisions, Decoder, Given, LabelScores, MAX_ARGUMENTS, ModelConfig, ModelError, Network,
-    NetworkUse, Pictures, Windows,
+    self, CalledWith, CoreOutput, Decoder, LabelScores, MAX_ARGUMENTS, ModelConfig, ModelError, Network, NetworkUse,
+    PictureIndex, Pictures, ReadError, ScopingKind, States, Windows, scalar, values,
 };
 use crate::program::Program;
-use crate::rollout::{Decision, Policy, Query, Specification};
+use crate::rollout::{Decision, Policy, PolicyError, Query, Specification};
 use crate::scene::SlotIndex;
-use crate::trace::{Prediction, ScopingLabel, Span, SpecificationForm};
+use crate::trace::{ObservationRows, Prediction, ScopingLabel, Span, SpecificationForm};
 
 /// A program ends when its end is at least this likely (the paper's alpha).
 const END_THRESHOLD: f32 = 0.5;
@@ -48,7 +48,7 @@ pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<
 
 /// Makes a policy of a network.
 struct Deciding {
-    name: &'static str,
+    name: String,
     reads: SpecificationForm,
     decoder: Decoder,
     tasks: Vec<String>,
@@ -58,7 +58,7 @@ impl NetworkUse for Deciding {
     type Output = Box<dyn Policy + Send>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        Box::new(LearnedPolicy::new(self.name, network, self.decoder).reading(self.reads).knowing(self.tasks))
+        Box::new(LearnedPolicy::new(&self.name, network, self.decoder).reading(self.reads).knowing(self.tasks))
     }
 }
 
@@ -78,14 +78,14 @@ pub struct LearnedPolicy<N: Network> {
 
 /// A call on an episode's stack.
 struct Running<R> {
-    given: Given,
+    called_with: CalledWith,
     /// What it remembers of its steps.
     recall: Option<R>,
 }
 
 impl<R> Running<R> {
-    fn called_with(given: Given) -> Self {
-        Self { given, recall: None }
+    fn called(called_with: CalledWith) -> Self {
+        Self { called_with, recall: None }
     }
 }
 
@@ -123,7 +123,7 @@ impl<N: Network> LearnedPolicy<N> {
     }
 
     /// Reads the demonstrations of new episodes, and forgets those of episodes that are over.
-    fn refresh(&mut self, queries: &[Query]) {
+    fn refresh(&mut self, queries: &[Query]) -> Result<(), PolicyError> {
         self.demonstrations.retain(|_, known| Arc::strong_count(&known.specification) > 1);
         let mut unknown: Vec<&Arc<Specification>> = Vec::new();
         for specification in queries.iter().map(|query| &query.specification) {
@@ -132,59 +132,78 @@ impl<N: Network> LearnedPolicy<N> {
                 unknown.push(specification);
             }
         }
-        let network = &self.network;
-        let read: Vec<Known<N::Demonstration>> = unknown
-            .into_par_iter()
-            .map(|specification| Known {
-                specification: Arc::clone(specification),
-                demonstration: network
-                    .demonstration(&windows(specification), &network.perceive(&specification.pictures)),
-            })
-            .collect();
-        self.demonstrations.extend(read.into_iter().map(|known| (key(&known.specification), known)));
+        let read: Vec<Result<Known<N::Demonstration>, PolicyError>> =
+            unknown.into_par_iter().map(|specification| self.read(specification)).collect();
+        for known in read {
+            let known = known?;
+            self.demonstrations.insert(key(&known.specification), known);
+        }
+        Ok(())
+    }
+
+    fn read(&self, specification: &Arc<Specification>) -> Result<Known<N::Demonstration>, PolicyError> {
+        let demonstration = || -> Result<N::Demonstration, ReadError> {
+            let windows = Windows::new(specification.n_slots, &[&specification.rows])?;
+            self.network.demonstration(&windows, &self.network.perceive(&specification.pictures)?)
+        };
+        match demonstration() {
+            Ok(demonstration) => Ok(Known { specification: Arc::clone(specification), demonstration }),
+            Err(problem) => Err(self.cannot(specification, problem)),
+        }
+    }
+
+    /// Why nothing can be decided in an episode.
+    fn cannot(&self, specification: &Specification, problem: ReadError) -> PolicyError {
+        PolicyError::Read { policy: self.name.clone(), task_id: specification.task_id.clone(), problem }
     }
 
     /// Takes the running call off its episode's stack. Calls above it have returned, and one that has just begun
     /// remembers nothing.
     fn running(&mut self, query: &Query) -> Running<N::Recall> {
         let stack = self.stacks.entry(query.episode).or_default();
-        stack.resize_with(usize::from(query.depth) + 1, || Running::called_with(Given::default()));
-        let mut running = stack.pop().unwrap_or_else(|| Running::called_with(Given::default()));
+        stack.resize_with(usize::from(query.depth) + 1, || Running::called(CalledWith::default()));
+        let mut running = stack.pop().unwrap_or_else(|| Running::called(CalledWith::default()));
         running.recall = running.recall.filter(|_| query.step > 0);
         if query.depth == 0 {
-            running.given.task = self.tasks.iter().position(|task| *task == query.specification.task_id);
+            running.called_with.task = self.tasks.iter().position(|task| *task == query.specification.task_id);
         }
         running
     }
 
     /// The decision, the running call after it, and what its callee is called with.
-    fn decide_one(&self, query: &Query, running: Running<N::Recall>) -> (Decision, [Running<N::Recall>; 2]) {
-        let Running { given, recall } = running;
-        let callee = |arguments| Running::called_with(Given { task: None, arguments });
-        let known = self.demonstrations.get(&key(&query.specification));
-        let Some(known) = known else {
-            return (Decision::end(query), [Running::called_with(given), callee(Default::default())]);
-        };
+    fn decide_one(
+        &self,
+        query: &Query,
+        running: Running<N::Recall>,
+    ) -> Result<(Decision, [Running<N::Recall>; 2]), ReadError> {
+        let Running { called_with, recall } = running;
+        let known = &self.demonstrations[&key(&query.specification)];
         let window = N::window(&known.demonstration, query.window);
-        let percepts = self.network.perceive(&query.seen);
-        let state = if query.seen.n > 0 { vec![0.0] } else { query.observation.to_flat() };
-        let reading = self.network.read(&window, &state, &percepts, &[given]);
+        let percepts = self.network.perceive(&query.seen)?;
+        let reading = self.network.read(&window, &states(query), &percepts, &[called_with])?;
         let (core, recall) = self.network.core(&reading, query.program, &[1], recall);
-        let (decision, arguments) = self.decision(query, &reading, &core);
-        (decision, [Running { given, recall: Some(recall) }, callee(arguments)])
+        let (decision, arguments) = self.decision(query, &reading, &core)?;
+        let callee = Running::called(CalledWith { task: None, arguments });
+        Ok((decision, [Running { called_with, recall: Some(recall) }, callee]))
     }
 
     /// The decision, and the slots that its callee is called with.
-    fn decision(&self, query: &Query, reading: &N::Reading, core: &CoreOutput) -> (Decision, Arguments) {
-        let end_probability = logistic(values(core.end.clone()).first().copied().unwrap_or_default());
-        let (program, program_probability) = likeliest_program(values(core.programs.clone()), N::DECISIONS);
+    fn decision(
+        &self,
+        query: &Query,
+        reading: &N::Reading,
+        core: &CoreOutput,
+    ) -> Result<(Decision, Arguments), ReadError> {
+        let end_probability = logistic(finite(scalar(core.end.clone())?, "the end of the program")?);
+        let programs = all_finite(core.programs.clone(), "the next program")?;
+        let (program, program_probability) = likeliest_program(programs, self.network.scoping());
         let labels = program.is_composite().then(|| self.network.scope(reading, query.program, core)).flatten();
-        let labels: Vec<LabelScores> = labels.map(label_scores).unwrap_or_default();
+        let labels: Vec<LabelScores> = labels.map(label_scores).transpose()?.unwrap_or_default();
         let scope = self
             .decoder
             .decode(&labels)
             .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
-        let arguments = self.arguments(reading, query, core, program);
+        let arguments = self.arguments(reading, query, core, program)?;
         let probabilities =
             |label: ScopingLabel| labels.iter().map(|scores| scores[label as usize].exp()).collect::<Vec<f32>>();
         let decision = Decision {
@@ -199,19 +218,25 @@ impl<N: Network> LearnedPolicy<N> {
                 stop_probabilities: probabilities(ScopingLabel::End),
             }),
         };
-        (decision, arguments)
+        Ok((decision, arguments))
     }
 
     /// The slots that a program is called with.
-    fn arguments(&self, reading: &N::Reading, query: &Query, core: &CoreOutput, callee: Program) -> Arguments {
+    fn arguments(
+        &self,
+        reading: &N::Reading,
+        query: &Query,
+        core: &CoreOutput,
+        callee: Program,
+    ) -> Result<Arguments, ReadError> {
         let mut arguments = Arguments::default();
-        let n_arguments = N::DECISIONS.n_arguments_of(callee);
+        let n_arguments = self.network.scoping().n_arguments_of(callee);
         if n_arguments > 0 {
-            let logits = values(self.network.argument(reading, query.program, core));
+            let logits = all_finite(self.network.argument(reading, query.program, core), "the argument")?;
             let rows = logits.chunks_exact(query.specification.n_slots.max(1)).take(n_arguments);
             arguments.iter_mut().zip(rows).for_each(|(slot, row)| *slot = Some(SlotIndex(likeliest(row).0 as u16)));
         }
-        arguments
+        Ok(arguments)
     }
 }
 
@@ -223,38 +248,42 @@ impl<N: Network> Policy for LearnedPolicy<N> {
         &self.name
     }
 
-    fn decides(&self) -> Decisions {
-        N::DECISIONS
+    fn scoping(&self) -> ScopingKind {
+        self.network.scoping()
     }
 
     fn reads(&self) -> SpecificationForm {
         self.reads
     }
 
-    fn detect(&self, pictures: &Pictures) -> Option<Vec<f32>> {
-        N::detected(&self.network.perceive(pictures)).map(<[f32]>::to_vec)
+    fn detect(&self, pictures: &Pictures) -> Result<Option<ObservationRows>, PolicyError> {
+        match self.network.perceive(pictures) {
+            Ok(percepts) => Ok(N::detected(&percepts).cloned()),
+            Err(problem) => Err(PolicyError::Detect { policy: self.name.clone(), problem }),
+        }
     }
 
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
-        self.refresh(queries);
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
+        self.refresh(queries)?;
         let running: Vec<_> = queries.iter().map(|query| self.running(query)).collect();
         let decided: Vec<_> =
             queries.par_iter().zip(running).map(|(query, running)| self.decide_one(query, running)).collect();
         let mut decisions = Vec::with_capacity(queries.len());
-        for (query, (decision, running)) in queries.iter().zip(decided) {
+        for (query, decided) in queries.iter().zip(decided) {
+            let (decision, running) = decided.map_err(|problem| self.cannot(&query.specification, problem))?;
             self.stacks.entry(query.episode).or_default().extend(running);
             decisions.push(decision);
         }
-        decisions
+        Ok(decisions)
     }
 }
 
-fn windows(specification: &Specification) -> Windows {
-    let rows = [specification.rows.as_slice()];
-    match specification.form {
-        SpecificationForm::Trajectories => Windows::new(specification.n_slots, &rows),
-        SpecificationForm::Instructions => Windows::of_instructions(specification.n_slots, &rows),
-        SpecificationForm::Video => Windows::of_pictures(specification.n_slots, &rows),
+/// What is seen at a query: its only picture, or where things are.
+fn states(query: &Query) -> States {
+    if query.seen.n > 0 {
+        States::Pictures(vec![PictureIndex(0)])
+    } else {
+        States::Observations(ObservationRows::of(query.observation.slots_m.len(), [&query.observation]))
     }
 }
 
@@ -262,8 +291,13 @@ fn key(specification: &Arc<Specification>) -> usize {
     Arc::as_ptr(specification).addr()
 }
 
-fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    tensor.into_data().try_into_vec().unwrap_or_default()
+/// What a network says. What is no number says nothing, and nothing is decided by it.
+fn finite(said: f32, what: &'static str) -> Result<f32, ReadError> {
+    if said.is_finite() { Ok(said) } else { Err(ReadError::NotFinite { what, found: said.to_string() }) }
+}
+
+fn all_finite<const D: usize>(tensor: Tensor<D>, what: &'static str) -> Result<Vec<f32>, ReadError> {
+    values(tensor)?.into_iter().map(|said| finite(said, what)).collect()
 }
 
 fn logistic(logit: f32) -> f32 {
@@ -271,9 +305,9 @@ fn logistic(logit: f32) -> f32 {
 }
 
 /// The likeliest program that may be called, and its probability among those.
-fn likeliest_program(mut logits: Vec<f32>, decisions: Decisions) -> (Program, f32) {
+fn likeliest_program(mut logits: Vec<f32>, scoping: ScopingKind) -> (Program, f32) {
     for (logit, program) in logits.iter_mut().zip(Program::ALL) {
-        if !decisions.may_call(program) {
+        if !scoping.may_call(program) {
             *logit = f32::NEG_INFINITY;
         }
     }
@@ -282,8 +316,9 @@ fn likeliest_program(mut logits: Vec<f32>, decisions: Decisions) -> (Program, f3
 }
 
 /// Log-probabilities of each frame's labels.
-fn label_scores(logits: Tensor<3>) -> Vec<LabelScores> {
-    values(logits).as_chunks::<{ ScopingLabel::ALL.len() }>().0.iter().map(log_probabilities).collect()
+fn label_scores(logits: Tensor<3>) -> Result<Vec<LabelScores>, ReadError> {
+    let logits = all_finite(logits, "the scoping labels")?;
+    Ok(logits.as_chunks::<{ ScopingLabel::ALL.len() }>().0.iter().map(log_probabilities).collect())
 }
 
 /// The first of the largest logits, and its probability.

@@ -1,7 +1,7 @@
 //! A policy that does what the expert would do: it tests the interpreter, before any learning.
 
-use crate::model::Decisions;
-use crate::rollout::{Decision, Expectation, Policy, Query, Start};
+use crate::model::ScopingKind;
+use crate::rollout::{Decision, Expectation, Policy, PolicyError, Query, Start};
 
 /// Knows for each episode what the expert would call next. What is knocked over it builds again.
 #[derive(Clone, Debug, Default)]
@@ -18,7 +18,7 @@ impl Oracle {
     /// For the episodes of [`super::run`] with the same starts.
     pub fn for_starts(starts: &[Start<'_>]) -> Self {
         let expectation = |start: &Start<'_>| {
-            Expectation::new(Decisions::Scoped, &start.demonstration.clone().boundaries_only(), start.world.scene())
+            Expectation::new(ScopingKind::Scoped, &start.demonstration.clone().boundaries_only(), start.world.scene())
         };
         Self::new(starts.iter().map(expectation).collect())
     }
@@ -43,7 +43,7 @@ impl Policy for Oracle {
         "oracle"
     }
 
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
-        queries.iter().map(|query| self.decide_one(query)).collect()
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
+        Ok(queries.iter().map(|query| self.decide_one(query)).collect())
     }
 }

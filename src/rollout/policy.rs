@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::model::{Decisions, Pictures};
+use crate::model::{PictureIndex, Pictures, ReadError, ScopingKind, SpecificationRows};
 use crate::program::Program;
 use crate::scene::SlotIndex;
-use crate::trace::{Episode, Observation, Prediction, Span, SpecificationForm, instructions};
+use crate::trace::{Episode, Observation, ObservationRows, Prediction, Span, SpecificationForm, instructions};
 
 /// A task specification as a policy sees it: a demonstration's boundary observations, or its instructions.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,13 +14,8 @@ pub struct Specification {
     pub task_id: String,
     /// Slots of each observation.
     pub n_slots: usize,
-    /// In which form it is given.
-    pub form: SpecificationForm,
     /// Boundary frames, or sentences.
-    pub n_frames: usize,
-    /// `[n_frames, 3 * n_slots + 2]`, or `[n_frames, MAX_WORDS]` of words as numbers, row by row.
-    /// With pictures `[n_frames]`, which of them each frame shows.
-    pub rows: Vec<f32>,
+    pub rows: SpecificationRows,
     /// The pictures of a video; none in another form.
     pub pictures: Pictures,
 }
@@ -28,7 +23,7 @@ pub struct Specification {
 impl Specification {
     /// The whole of it.
     pub fn whole(&self) -> Span {
-        Span { begin: 0, end: self.n_frames as u32 }
+        Span { begin: 0, end: self.rows.len() as u32 }
     }
 }
 
@@ -76,9 +71,9 @@ pub trait Policy {
     /// The variant's name, as in reports.
     fn name(&self) -> &str;
 
-    /// What it decides.
-    fn decides(&self) -> Decisions {
-        Decisions::Scoped
+    /// What it gives callees to see.
+    fn scoping(&self) -> ScopingKind {
+        ScopingKind::Scoped
     }
 
     /// The form of task specification that it reads.
@@ -86,14 +81,55 @@ pub trait Policy {
         SpecificationForm::Trajectories
     }
 
-    /// The observation rows that a detector finds in pictures, `[F, 3 N + 2]`; nothing from a policy without one.
-    fn detect(&self, _pictures: &Pictures) -> Option<Vec<f32>> {
-        None
+    /// The observations that a detector finds in pictures, a row each; nothing from a policy without one.
+    ///
+    /// # Errors
+    ///
+    /// [`PolicyError`] when its numbers cannot be read.
+    fn detect(&self, _pictures: &Pictures) -> Result<Option<ObservationRows>, PolicyError> {
+        Ok(None)
     }
 
     /// One decision a query, in order. Must not depend on which queries come together, but may on earlier ones of the
     /// same running call.
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision>;
+    ///
+    /// # Errors
+    ///
+    /// [`PolicyError`] when one cannot be decided; nothing is decided by default.
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError>;
+}
+
+/// A decision that cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PolicyError {
+    /// The network cannot read what it is given, or says what is no number.
+    #[error("policy {policy} cannot decide in task {task_id}: {problem}")]
+    Read {
+        /// The variant's name.
+        policy: String,
+        /// The task's id.
+        task_id: String,
+        /// Why.
+        problem: ReadError,
+    },
+    /// A detector's numbers cannot be read.
+    #[error("policy {policy} cannot detect anything in pictures: {problem}")]
+    Detect {
+        /// The variant's name.
+        policy: String,
+        /// Why.
+        problem: ReadError,
+    },
+    /// The policy answered another number of queries than it was asked.
+    #[error("policy {policy} made {found} decisions; asked for were {expected}")]
+    Count {
+        /// The variant's name.
+        policy: String,
+        /// Decisions made.
+        found: usize,
+        /// Queries asked.
+        expected: usize,
+    },
 }
 
 impl Decision {
@@ -115,31 +151,23 @@ impl Specification {
 
     /// The video of an episode: pictures of its boundary frames.
     pub fn video(episode: &Episode, pictures: Pictures) -> Self {
-        let n_frames = episode.boundary_frames().count();
-        Self {
-            form: SpecificationForm::Video,
-            n_frames,
-            rows: (0..n_frames).map(|frame| frame as f32).collect(),
-            pictures,
-            ..Self::of(episode)
-        }
+        let n_frames = episode.boundary_frames().count() as u32;
+        let rows = SpecificationRows::Pictures((0..n_frames).map(PictureIndex).collect());
+        Self { rows, pictures, ..Self::of(episode) }
     }
 
     /// The instructions of an episode.
     pub fn instructions(episode: &Episode) -> Self {
-        let instructions = instructions(&episode.calls, &episode.scene.slots);
-        let rows = instructions.iter().flat_map(|instruction| instruction.words).map(f32::from).collect();
-        let (n_slots, n_frames) = (episode.scene.slots.len(), instructions.len());
-        let task_id = episode.provenance.task_id.clone();
-        Self { task_id, n_slots, form: SpecificationForm::Instructions, n_frames, rows, pictures: Pictures::default() }
+        let said = instructions(&episode.calls, &episode.scene.slots);
+        let rows = SpecificationRows::Sentences(said.iter().map(|instruction| instruction.words).collect());
+        Self { rows, ..Self::of(episode) }
     }
 
     /// The boundary frames of an episode.
     pub fn of(episode: &Episode) -> Self {
-        let rows: Vec<f32> = episode.boundary_frames().flat_map(|(_, frame)| frame.observation().to_flat()).collect();
         let n_slots = episode.scene.slots.len();
-        let n_frames = rows.len() / Observation::width(n_slots);
-        let task_id = episode.provenance.task_id.clone();
-        Self { task_id, n_slots, form: SpecificationForm::Trajectories, n_frames, rows, pictures: Pictures::default() }
+        let observations: Vec<Observation> = episode.boundary_frames().map(|(_, frame)| frame.observation()).collect();
+        let rows = SpecificationRows::Observations(ObservationRows::of(n_slots, &observations));
+        Self { task_id: episode.provenance.task_id.clone(), n_slots, rows, pictures: Pictures::default() }
     }
 }

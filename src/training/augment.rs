@@ -1,18 +1,15 @@
 //! Augmentations: what may be changed about an example without changing what is right.
-//!
-//! # Shapes
-//!
-//! Rows are [`crate::trace::Observation::to_flat`]: positions relative to the gripper, then (open, closed).
 
 mod containers;
 
 use rand::Rng;
 use rand::seq::SliceRandom as _;
 
+use crate::model::{SpecificationRows, States};
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
 use crate::task::Family;
-use crate::trace::{Observation, SpecificationForm};
+use crate::trace::{ObservationRow, ObservationRowMut};
 use crate::training::augment::containers::Merge;
 use crate::training::config::TrainConfig;
 use crate::training::examples::Example;
@@ -25,11 +22,10 @@ const SCATTER_M: [f32; 3] = [0.08, 0.08, 0.04];
 /// An example's own copies of what augmentations change.
 pub(super) struct Views {
     pub(super) n_slots: usize,
-    pub(super) specification: SpecificationForm,
-    /// Rows of the window of the task specification.
-    pub(super) window: Vec<f32>,
-    /// The row that is seen now.
-    pub(super) state: Vec<f32>,
+    /// The window of the task specification.
+    pub(super) window: SpecificationRows,
+    /// What is seen now.
+    pub(super) state: States,
     /// The decision; its labels change with what is seen.
     pub(super) example: Example,
 }
@@ -43,20 +39,25 @@ impl Views {
         let place = Place::draw(self.n_slots, rng);
         let order = relabelling(family, self.n_slots, rng);
         if let Some(merge) = merge.filter(|_| merged < config.merge_containers) {
-            merge.apply(self);
+            self.rows_mut().for_each(|mut row| merge.apply_to_row(row.positions));
+            merge.apply_to_slots(&mut self.example);
         }
         if scattered < config.scatter_bystanders {
             self.scatter(rng);
         }
-        if jittered < config.gripper_jitter.unwrap_or_default() && may_jitter(&self.example, &self.state) {
-            place.put_gripper(&mut self.state, self.example.next_move);
+        if jittered < config.gripper_jitter.unwrap_or_default() {
+            self.state.iter_mut().for_each(|state| place.put_gripper(state, &self.example));
         }
         if relabelled < config.relabel_slots.unwrap_or_default() {
-            self.window.chunks_exact_mut(Observation::width(self.n_slots)).for_each(|row| relabel(row, &order));
-            relabel(&mut self.state, &order);
-            let given = self.example.given.arguments.iter_mut().flatten();
-            self.example.arguments.iter_mut().chain(given).for_each(|slot| *slot = label(&order, *slot));
+            self.rows_mut().for_each(|row| relabel(row.positions, &order));
+            let called_with = self.example.called_with.arguments.iter_mut().flatten();
+            self.example.arguments.iter_mut().chain(called_with).for_each(|slot| *slot = label(&order, *slot));
         }
+    }
+
+    /// The observations that are read: those of the window, where it has some, and what is seen now.
+    fn rows_mut(&mut self) -> impl Iterator<Item = ObservationRowMut<'_>> {
+        self.window.iter_mut().chain(self.state.iter_mut())
     }
 
     /// Puts about half of the slots that the running program has nothing to do with beside other slots: in the
@@ -70,21 +71,25 @@ impl Views {
             if involved || beside == slot || moved < 0.5 {
                 continue;
             }
-            let demonstrated = demonstrated > 0.25 && self.specification == SpecificationForm::Trajectories;
-            for (rows, is_put) in [(&mut self.window, demonstrated), (&mut self.state, seen > 0.25)] {
-                if is_put {
-                    put_beside(rows, self.n_slots, slot, beside, offset);
-                }
+            if demonstrated > 0.25 {
+                put_beside(self.window.iter_mut(), slot, beside, offset);
+            }
+            if seen > 0.25 {
+                put_beside(self.state.iter_mut(), slot, beside, offset);
             }
         }
     }
 }
 
 /// Shifts a slot in all rows, so that in the first it lies beside another.
-fn put_beside(rows: &mut [f32], n_slots: usize, slot: usize, other: usize, offset: [f32; 3]) {
-    let shift: [f32; 3] = std::array::from_fn(|axis| rows[3 * other + axis] + offset[axis] - rows[3 * slot + axis]);
-    for row in rows.chunks_exact_mut(Observation::width(n_slots)) {
-        row[3 * slot..].iter_mut().zip(shift).for_each(|(coordinate, shift)| *coordinate += shift);
+fn put_beside<'r>(rows: impl Iterator<Item = ObservationRowMut<'r>>, slot: usize, other: usize, offset: [f32; 3]) {
+    let mut shift = None;
+    for row in rows {
+        let positions = row.positions;
+        let shift = *shift.get_or_insert_with(|| -> [f32; 3] {
+            std::array::from_fn(|axis| positions[other][axis] + offset[axis] - positions[slot][axis])
+        });
+        positions[slot].iter_mut().zip(shift).for_each(|(coordinate, shift)| *coordinate += shift);
     }
 }
 
@@ -99,11 +104,9 @@ fn relabelling(family: Family, n_slots: usize, rng: &mut impl Rng) -> Vec<usize>
     slots
 }
 
-fn relabel(row: &mut [f32], order: &[usize]) {
-    let shown = row.to_vec();
-    for (position, &slot) in row.chunks_exact_mut(3).zip(order) {
-        position.copy_from_slice(&shown[3 * slot..3 * slot + 3]);
-    }
+fn relabel(positions: &mut [[f32; 3]], order: &[usize]) {
+    let shown = positions.to_vec();
+    positions.iter_mut().zip(order).for_each(|(position, &slot)| *position = shown[slot]);
 }
 
 /// Under which label a slot is shown.
@@ -114,9 +117,8 @@ fn label(order: &[usize], slot: SlotIndex) -> SlotIndex {
 
 /// Whether the decision stays right wherever the gripper is: it is empty, and the next primitive moves it (or none
 /// comes).
-fn may_jitter(example: &Example, state: &[f32]) -> bool {
-    let open = state[state.len() - 2] > 0.5;
-    open && (example.next_move.is_some() || example.last_decision)
+fn may_jitter(example: &Example, state: ObservationRow<'_>) -> bool {
+    state.is_open() && (example.next_move.is_some() || example.last_decision)
 }
 
 /// Where a jittered gripper is put.
@@ -138,14 +140,19 @@ impl Place {
 
     /// Positions are relative to the gripper: moving it moves everything else. It is never put above what it shall
     /// move to next, since there the move would be done.
-    fn put_gripper(&self, state: &mut [f32], next_move: Option<SlotIndex>) {
+    fn put_gripper(&self, state: ObservationRowMut<'_>, example: &Example) {
+        if !may_jitter(example, state.as_row()) {
+            return;
+        }
         let offset = match *self {
             Self::Offset(offset) => offset,
-            Self::Above { slot, .. } if next_move.is_some_and(|next| usize::from(next.0) == slot) => return,
-            Self::Above { slot, height_m } => [state[3 * slot], state[3 * slot + 1], state[3 * slot + 2] + height_m],
+            Self::Above { slot, .. } if example.next_move.is_some_and(|next| usize::from(next.0) == slot) => return,
+            Self::Above { slot, height_m } => {
+                let [x, y, z] = state.positions[slot];
+                [x, y, z + height_m]
+            }
         };
-        let n_coordinates = state.len() - 2;
-        for position in state[..n_coordinates].chunks_exact_mut(3) {
+        for position in state.positions {
             position.iter_mut().zip(offset).for_each(|(coordinate, offset)| *coordinate -= offset);
         }
     }

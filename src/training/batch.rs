@@ -7,10 +7,11 @@
 
 use rand::Rng;
 
-use crate::model::{Given, Pictures, Windows};
+use crate::model::{CalledWith, Pictures, States, Windows};
 use crate::program::Program;
 use crate::seed::Seed;
-use crate::trace::{Observation, ScopingLabel, SpecificationForm};
+use crate::trace::{ScopingLabel, Span};
+use crate::training::TrainError;
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
@@ -48,8 +49,8 @@ pub struct Part {
     pub steps: Vec<usize>,
     /// What it sees of the demonstrations.
     pub windows: Windows,
-    /// What is seen now, an observation row each.
-    pub states: Vec<f32>,
+    /// What is seen now, one each.
+    pub states: States,
     /// `[B, programs]`
     pub programs: Vec<f32>,
     /// One where the program ends, `[B]`.
@@ -58,10 +59,10 @@ pub struct Part {
     pub weight: f32,
     /// `[B, T, 4]`; nothing without labels.
     pub scopes: Option<Vec<f32>>,
-    /// `[B * arguments, N]`, see [`crate::model::Decisions::n_arguments`]; nothing without labels.
+    /// `[B * arguments, N]`, see [`crate::model::ScopingKind::n_arguments`]; nothing without labels.
     pub arguments: Option<Vec<f32>>,
     /// What each running program was called with.
-    pub given: Vec<Given>,
+    pub called_with: Vec<CalledWith>,
 }
 
 /// Decisions of one call that are learned together, all with the same window.
@@ -81,7 +82,17 @@ impl Run {
 
 /// Draws a mini-batch of a level, of `size` decisions or, where they come in calls, a few more. It depends on nothing
 /// but its arguments.
-pub fn draw(examples: &Examples<'_>, config: &TrainConfig, level_idx: usize, size: usize, seed: Seed) -> Vec<Part> {
+///
+/// # Errors
+///
+/// [`TrainError::Read`] when the decisions do not go together: a bug.
+pub fn draw(
+    examples: &Examples<'_>,
+    config: &TrainConfig,
+    level_idx: usize,
+    size: usize,
+    seed: Seed,
+) -> Result<Vec<Part>, TrainError> {
     let mut rng = seed.rng();
     let is_root = examples.levels().nth(level_idx).is_some_and(|(_, is_root)| is_root);
     let mut runs: Vec<Run> = Vec::new();
@@ -155,7 +166,7 @@ fn prepare_run(
     rng: &mut (impl Rng + Clone),
 ) -> Run {
     // What is knocked over in the middle of a remembered run would have to stay so.
-    let may_recover = is_root && run.len() == 1 && examples.decisions().has_scopes();
+    let may_recover = is_root && run.len() == 1 && examples.scoping().has_scopes();
     let at_first = rng.clone();
     let prepare = |example| {
         *rng = at_first.clone();
@@ -172,13 +183,12 @@ fn prepare(
     rng: &mut impl Rng,
 ) -> Views {
     let data = examples.data();
-    let width = Observation::width(data.n_slots);
     let family = data.trials[example.trial].family;
+    let now = Span { begin: example.frame as u32, end: example.frame as u32 + 1 };
     let mut views = Views {
         n_slots: data.n_slots,
-        specification: examples.specification(),
         window: examples.specification_rows(example.demonstration, example.window),
-        state: data.trials[example.trial].observations[example.frame * width..][..width].to_vec(),
+        state: States::Observations(examples.observations(example.trial, now)),
         example,
     };
     // One draw, whatever the settings: see `Views::augment`.
@@ -186,22 +196,23 @@ fn prepare(
     let recovers = recovery.random::<f32>() < config.recovery_states.unwrap_or_default();
     if recovers && may_recover && family.builds_towers() {
         let sub_tasks = examples.sub_tasks(views.example.demonstration);
-        recovery::knock_over(&sub_tasks, &mut views.example, &mut views.state, &mut recovery);
+        let Views { state, example, .. } = &mut views;
+        state.iter_mut().for_each(|mut row| recovery::knock_over(&sub_tasks, example, &mut row, &mut recovery));
     }
     views.augment(family, config, rng);
     views
 }
 
-pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>, counts: Counts) -> Part {
+pub(super) fn assemble(
+    examples: &Examples<'_>,
+    level_idx: usize,
+    runs: Vec<Run>,
+    counts: Counts,
+) -> Result<Part, TrainError> {
     let (part, steps) = packed(runs);
     let n_slots = examples.data().n_slots;
     let n_programs = examples.known_programs().count();
-    let slices: Vec<&[f32]> = part.iter().map(|prepared| prepared.window.as_slice()).collect();
-    let windows = match examples.specification() {
-        SpecificationForm::Trajectories => Windows::new(n_slots, &slices),
-        SpecificationForm::Instructions => Windows::of_instructions(n_slots, &slices),
-        SpecificationForm::Video => Windows::of_pictures(n_slots, &slices),
-    };
+    let windows = Windows::new(n_slots, &part.iter().map(|prepared| &prepared.window).collect::<Vec<_>>())?;
     let weight = 1.0 / counts.examples as f32;
     let one_hot = |width: usize, hot: Option<usize>, value: f32| {
         (0..width).map(move |column| if Some(column) == hot { value } else { 0.0 })
@@ -212,26 +223,26 @@ pub(super) fn assemble(examples: &Examples<'_>, level_idx: usize, runs: Vec<Run>
         let value = 1.0 / counts.arguments as f32;
         let slots = |prepared: &Views| {
             let named = prepared.example.arguments.iter().map(|slot| Some(usize::from(slot.0)));
-            named.chain(std::iter::repeat(None)).take(examples.decisions().n_arguments()).collect::<Vec<_>>()
+            named.chain(std::iter::repeat(None)).take(examples.scoping().n_arguments()).collect::<Vec<_>>()
         };
         part.iter().flat_map(slots).flat_map(|slot| one_hot(n_slots, slot, value)).collect()
     });
     let scoped = part.iter().any(|prepared| prepared.example.scope.is_some());
     let scopes = scoped.then(|| scope_targets(&part, windows.n_frames(), 1.0 / counts.scoped_frames as f32));
-    Part {
+    Ok(Part {
         batch_idx: 0,
         level_idx,
         program: examples.levels().nth(level_idx).map_or(Program::None, |(program, _)| program),
         steps,
         windows,
-        states: part.iter().flat_map(|prepared| &prepared.state).copied().collect(),
+        states: States::concat(part.iter().map(|prepared| &prepared.state))?,
         programs,
         ends: part.iter().map(|prepared| f32::from(u8::from(prepared.example.end_of_program))).collect(),
         weight,
         scopes,
         arguments,
-        given: part.iter().map(|prepared| prepared.example.given).collect(),
-    }
+        called_with: part.iter().map(|prepared| prepared.example.called_with).collect(),
+    })
 }
 
 /// `[B, T, 4]`, zero where a frame has no label.

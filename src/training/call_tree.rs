@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::dataset::TrialData;
-use crate::model::Decisions;
+use crate::model::ScopingKind;
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{Observation, ProgramCall, Span};
@@ -30,7 +30,7 @@ impl CallTree {
     /// # Errors
     ///
     /// [`TrainError::Trial`] when its calls and frames do not fit together.
-    pub(super) fn new(trial: &TrialData, n_slots: usize, decisions: Decisions) -> Result<Self, TrainError> {
+    pub(super) fn new(trial: &TrialData, n_slots: usize, scoping: ScopingKind) -> Result<Self, TrainError> {
         check(trial, n_slots)?;
         let calls = &trial.calls;
         let mut callees = vec![Vec::new(); calls.len()];
@@ -40,9 +40,9 @@ impl CallTree {
             }
         }
         let signatures = callees[0].iter().map(|&position| (position, moves_below(calls, position))).collect();
-        let decisions = match decisions {
-            Decisions::Primitives => BTreeMap::from([(calls[0].program, vec![without_hierarchy(calls)])]),
-            Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => by_program(calls, &callees),
+        let decisions = match scoping {
+            ScopingKind::Primitives => BTreeMap::from([(calls[0].program, vec![without_hierarchy(calls)])]),
+            ScopingKind::Scoped | ScopingKind::Unscoped | ScopingKind::Arguments => by_program(calls, &callees),
         };
         Ok(Self { callees, signatures, decisions })
     }

@@ -61,6 +61,9 @@ pub(crate) struct Standing {
     pub(crate) step: u32,
     /// Decisions learned from.
     pub(crate) examples: u64,
+    /// Gradients that were no numbers and were left out.
+    #[serde(default)]
+    pub(crate) dropped_gradients: u32,
     pub(crate) errors: LevelErrors,
     pub(crate) metrics: Vec<Metric>,
 }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Architecture, EncoderKind, Variant};
+use crate::model::{ScopingKind, Variant};
 use crate::trace::SpecificationForm;
 use crate::training::TrainError;
 use crate::training::detector_config::DetectorTraining;
@@ -37,9 +37,8 @@ impl Training {
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
         }
-        let has_colours = matches!(self.variant.encoder(), EncoderKind::ColourSlots | EncoderKind::Detected);
         match self.config.colours {
-            Some(colours) if !has_colours => {
+            Some(colours) if !self.variant.encoder().has_colours() => {
                 return refuse(
                     "colours",
                     format!("{colours} for variant {}", self.variant),
@@ -58,7 +57,7 @@ impl Training {
         if self.specification != SpecificationForm::Instructions {
             return Ok(());
         }
-        if self.variant != Variant::Ntp {
+        if self.variant != Variant::NTP {
             let found = format!("{} with variant {}", self.specification, self.variant);
             return refuse("specification", found, "instructions with variant ntp alone");
         }
@@ -75,22 +74,16 @@ impl Training {
     /// With every default that depends on the variant filled in.
     #[must_use]
     pub fn resolved(&self) -> Self {
-        let (steps, learning_rate, relabel_slots, gripper_jitter, recovery_states) = match self.variant.encoder() {
-            EncoderKind::ObjectCentric => (1000, 0.003, 0.0, 0.2, 0.25),
-            EncoderKind::Flattened => (3000, 0.002, 1.0, 0.0, 0.0),
-            EncoderKind::ColourSlots => (2000, 0.003, 0.0, 0.0, 0.0),
-            EncoderKind::Keypoints => (3000, 0.002, 0.0, 0.0, 0.0),
-            EncoderKind::Convolved | EncoderKind::DetectedFlattened => (3000, 0.001, 0.0, 0.0, 0.0),
-            EncoderKind::Detected => (2000, 0.003, 0.0, 0.2, 0.25),
-        };
+        let defaults = self.variant.encoder().training();
         // What a task does to which slot stands in the weights of a model without a specification.
-        let relabel_slots = if self.variant.architecture() == Architecture::Npi { 0.0 } else { relabel_slots };
+        let may_relabel = self.variant.scoping() != ScopingKind::Arguments;
+        let relabel_slots = if may_relabel { defaults.relabel_slots } else { 0.0 };
         let config = TrainConfig {
-            steps: self.config.steps.or(Some(steps)),
-            learning_rate: self.config.learning_rate.or(Some(learning_rate)),
+            steps: self.config.steps.or(Some(defaults.steps)),
+            learning_rate: self.config.learning_rate.or(Some(defaults.learning_rate)),
             relabel_slots: self.config.relabel_slots.or(Some(relabel_slots)),
-            gripper_jitter: self.config.gripper_jitter.or(Some(gripper_jitter)),
-            recovery_states: self.config.recovery_states.or(Some(recovery_states)),
+            gripper_jitter: self.config.gripper_jitter.or(Some(defaults.gripper_jitter)),
+            recovery_states: self.config.recovery_states.or(Some(defaults.recovery_states)),
             detector: self.config.detector.resolved(self.variant),
             ..self.config.clone()
         };

@@ -50,9 +50,7 @@ impl LevelErrors {
 
     /// Takes in a mini-batch's loss.
     pub(crate) fn update(&mut self, level: usize, loss: f32) {
-        if loss.is_finite() {
-            self.0[level] += FOLLOW * (loss - self.0[level]);
-        }
+        self.0[level] += FOLLOW * (loss - self.0[level]);
     }
 }
 

@@ -13,13 +13,15 @@ use rayon::iter::{IntoParallelIterator as _, IntoParallelRefIterator as _, Paral
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetTrials, Wanted};
-use crate::model::{Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world};
+use crate::model::{
+    Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world, scalar,
+};
 use crate::seed::Seed;
-use crate::trace::Observation;
+use crate::trace::{Observation, ObservationRows};
 use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
 use crate::training::config::TrainConfig;
 use crate::training::detector_metrics::DetectorMetric;
-use crate::training::learner::Learner;
+use crate::training::learner::{Learner, Stepped};
 use crate::training::run::dataset_hash;
 use crate::training::seen::{all_frames, fetch, sample};
 use crate::training::{Gallery, Hooks, Progress, TrainError};
@@ -38,6 +40,9 @@ const PORTION: usize = 64;
 #[serde(deny_unknown_fields)]
 pub(super) struct DetectorStanding {
     step: u32,
+    /// Gradients that were no numbers and were left out.
+    #[serde(default)]
+    pub(super) dropped_gradients: u32,
     pub(super) metrics: Vec<DetectorMetric>,
 }
 
@@ -60,8 +65,8 @@ pub(super) struct DetectorRun<'r> {
 /// Pictures, and what is to be seen in them.
 struct Shown {
     pictures: Pictures,
-    /// Of all slots in the world, in metres: `[F, 3 N]`.
-    positions: Vec<f32>,
+    /// Of all slots in the world, in metres: `[F * N]`.
+    positions: Vec<[f32; 3]>,
 }
 
 impl DetectorRun<'_> {
@@ -80,7 +85,7 @@ impl DetectorRun<'_> {
         let fresh = Learner::new(detector, device, self.config.clip_norm);
         let (mut learner, mut standing) = match checkpoints.resume(fresh)? {
             Ok(Resumed { learner, standing }) => (learner, standing),
-            Err(learner) => (self.acquainted(learner)?, DetectorStanding::default()),
+            Err(learner) => (self.calibrated(learner)?, DetectorStanding::default()),
         };
         let n_steps = self.config.detector.n_steps();
         let mut is_saved = standing.step == n_steps;
@@ -104,12 +109,13 @@ impl DetectorRun<'_> {
     }
 
     /// Before the first step.
-    fn acquainted<D: Detector>(&self, learner: Learner<D>) -> Result<Learner<D>, TrainError> {
+    fn calibrated<D: Detector>(&self, learner: Learner<D>) -> Result<Learner<D>, TrainError> {
         let (sample, trials): (PictureSample, _) = sample(self.data, self.gallery)?;
-        let rows: Vec<f32> = trials.iter().flat_map(|&trial| &self.data.trials[trial].observations).copied().collect();
+        let rows = trials.iter().flat_map(|&trial| &self.data.trials[trial].observations).copied().collect();
+        let rows = ObservationRows::new(self.data.n_slots, rows);
         let seed = self.seed.derive("acquainted", &[]);
-        let positions = positions_in_world(&rows, self.data.n_slots, &sample.pictures.grippers);
-        let detector = learner.module().clone().acquainted(&sample, &positions, seed);
+        let positions = positions_in_world(&rows, &sample.pictures.grippers);
+        let detector = learner.module().clone().calibrated(&sample, &positions, seed)?;
         Ok(learner.with_module(detector))
     }
 
@@ -129,13 +135,20 @@ impl DetectorRun<'_> {
         }
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
         let weight = 1.0 / GROUPS as f32;
-        let (learner, losses) = learner.step(&groups, learning_rate, |detector: &D, shown: &Shown| {
-            let loss = detection_loss(detector.detect(&shown.pictures), &shown.positions);
+        let step = standing.step + 1;
+        let lose = |detector: &D, shown: &Shown| -> Result<_, TrainError> {
+            let loss = detection_loss(detector.detect(&shown.pictures)?, &shown.positions)?;
             let total: Tensor<1> = loss.total * weight;
-            ([total.clone().into_scalar::<f32>(), loss.distance_m * weight], Some(total))
-        });
+            let found = scalar(total.clone())?;
+            if !found.is_finite() {
+                return Err(TrainError::NotFinite { step, level: "detector", found });
+            }
+            Ok(([found, loss.distance_m * weight], Some(total)))
+        };
+        let Stepped { learner, losses, dropped } = learner.step(&groups, learning_rate, lose)?;
         let [loss, distance_m] = [0, 1].map(|at| losses.iter().map(|losses| losses[at]).sum::<f32>());
-        standing.step += 1;
+        standing.step = step;
+        standing.dropped_gradients += u32::from(dropped);
         let pictures = groups.iter().map(|shown| shown.pictures.n as u32).sum();
         if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.detector.n_steps() {
             standing.metrics.push(DetectorMetric { step: standing.step, loss, distance_m, learning_rate, pictures });
@@ -166,7 +179,7 @@ impl DetectorRun<'_> {
 
     /// A group's pictures with what is to be seen in them.
     fn show(&self, drawn: &[Wanted]) -> Result<Shown, TrainError> {
-        let width = Observation::width(self.data.n_slots);
+        let (n_slots, width) = (self.data.n_slots, Observation::width(self.data.n_slots));
         let (across, down) = self.gallery.size();
         let (mut pictures, mut rows) = (Pictures::of_size(across, down), Vec::new());
         for wanted in drawn {
@@ -174,7 +187,7 @@ impl DetectorRun<'_> {
             let observations = &self.data.trials[wanted.position].observations;
             rows.extend(wanted.frames.iter().flat_map(|&frame| &observations[frame * width..][..width]));
         }
-        let positions = positions_in_world(&rows, self.data.n_slots, &pictures.grippers);
+        let positions = positions_in_world(&ObservationRows::new(n_slots, rows), &pictures.grippers);
         Ok(Shown { pictures, positions })
     }
 }
@@ -190,7 +203,7 @@ pub(super) fn detected<D: Detector>(
     let of_trial = |wanted: &Wanted| {
         let mut pictures = Pictures::of_size(width, height);
         fetch(data, gallery, wanted, &mut pictures)?;
-        Ok(detected_rows(&detector, &pictures))
+        Ok(detected_rows(&detector, &pictures, data.n_slots)?.into_values())
     };
     let trials: Vec<Wanted> = (0..data.trials.len()).map(|trial| all_frames(data, trial)).collect();
     let mut observations: Vec<Vec<f32>> = Vec::with_capacity(trials.len());

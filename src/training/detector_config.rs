@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{EncoderKind, Variant, VggDetectorConfig};
+use crate::model::{Variant, VggDetectorConfig};
 use crate::training::TrainError;
 
 /// How a detector is trained: apart, before the network behind it, which then learns on what it detects.
@@ -38,16 +38,12 @@ impl DetectorTraining {
 
     /// With every default filled in for a variant that has a detector.
     pub(super) fn resolved(self, variant: Variant) -> Self {
-        let (pictures, learning_rate, narrowed) = match variant.encoder() {
-            EncoderKind::Detected => (192, 0.002, None),
-            EncoderKind::DetectedFlattened => (32, 0.0005, Some(VggDetectorConfig::NARROWED as u32)),
-            _ => return self,
-        };
+        let Some(defaults) = variant.encoder().detector() else { return self };
         Self {
-            steps: self.steps.or(Some(3000)),
-            pictures: self.pictures.or(Some(pictures)),
-            learning_rate: self.learning_rate.or(Some(learning_rate)),
-            narrowed: self.narrowed.or(narrowed),
+            steps: self.steps.or(Some(defaults.steps)),
+            pictures: self.pictures.or(Some(defaults.pictures)),
+            learning_rate: self.learning_rate.or(Some(defaults.learning_rate)),
+            narrowed: self.narrowed.or(defaults.narrowed),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::artifact::IoError;
-use crate::model::ModelError;
+use crate::model::{CONFIG_FILE, ConfigError, ModelError, ReadError, TensorError};
 use crate::table::TableError;
 
 /// A training that cannot go on.
@@ -19,6 +19,9 @@ pub enum TrainError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// No network can be made with the settings.
+    #[error("{}: {}", CONFIG_FILE, .0)]
+    Network(#[from] ConfigError),
     /// The dataset has nothing to learn from.
     #[error("none of the dataset's {total} successful episodes is of a training task")]
     NoTrials {
@@ -49,6 +52,22 @@ pub enum TrainError {
         /// What is wrong.
         problem: String,
     },
+    /// What was learned from cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A loss that is no number, from which nothing can be learned any more.
+    #[error(
+        "the loss of {level} is {found} in step {step}; allowed: finite numbers. A lower learning_rate or clip_norm may \
+         help; the checkpoint before is kept"
+    )]
+    NotFinite {
+        /// The step, from 1.
+        step: u32,
+        /// Whose decisions were learned; `detector` for a detector.
+        level: &'static str,
+        /// The loss.
+        found: f32,
+    },
     /// A checkpoint cannot be used; removing its folder starts afresh.
     #[error("checkpoint cannot be used: {problem}: {}", path.display())]
     Checkpoint {
@@ -72,4 +91,10 @@ pub enum TrainError {
         /// Steps done.
         step: u32,
     },
+}
+
+impl From<TensorError> for TrainError {
+    fn from(error: TensorError) -> Self {
+        Self::Read(error.into())
+    }
 }

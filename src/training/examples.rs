@@ -16,13 +16,13 @@ use std::collections::BTreeMap;
 use rand::Rng;
 
 use crate::dataset::{DatasetTrials, TrialData};
-use crate::model::{Decisions, Given};
+use crate::model::{CalledWith, PictureIndex, ScopingKind, SpecificationRows};
 use crate::program::{KnownPrograms, Program};
 use crate::scene::SlotIndex;
 use crate::task::Split;
-use crate::trace::{Observation, ProgramCall, Span, SpecificationForm, instruction_spans};
+use crate::trace::{Observation, ObservationRows, ProgramCall, Span, SpecificationForm, instruction_spans};
 use crate::training::call_tree::{CallTree, moves_below};
-use crate::training::recovery::{SubTask, position};
+use crate::training::sub_task::SubTask;
 use crate::training::{Pairing, TrainError};
 
 /// One decision of an expert.
@@ -45,7 +45,7 @@ pub struct Example {
     /// The slots that the callee was called with, as far as the model decides them.
     pub arguments: Vec<SlotIndex>,
     /// What the running program was called with, where there is no specification.
-    pub given: Given,
+    pub called_with: CalledWith,
     /// What the next primitive is called with; `None` where it is not a `move_to`.
     pub next_move: Option<SlotIndex>,
     /// Arguments of every move below the running program.
@@ -70,7 +70,7 @@ pub struct Examples<'d> {
     specification: SpecificationForm,
     /// For each trial and call, the callee's part of the trial's specification.
     parts: Vec<Vec<Option<Span>>>,
-    decisions: Decisions,
+    scoping: ScopingKind,
     grain: Grain,
     trees: Vec<CallTree>,
     /// Positions of the training trials, by task.
@@ -96,7 +96,7 @@ impl<'d> Examples<'d> {
     ///
     /// As [`Self::of`].
     pub fn new(data: &'d DatasetTrials) -> Result<Self, TrainError> {
-        Self::of(data, SpecificationForm::Trajectories, Decisions::Scoped, Grain::Decision)
+        Self::of(data, SpecificationForm::Trajectories, ScopingKind::Scoped, Grain::Decision)
     }
 
     /// Indexes a dataset for what a model decides.
@@ -107,13 +107,13 @@ impl<'d> Examples<'d> {
     pub fn of(
         data: &'d DatasetTrials,
         specification: SpecificationForm,
-        decisions: Decisions,
+        scoping: ScopingKind,
         grain: Grain,
     ) -> Result<Self, TrainError> {
         let mut by_task: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
         let (mut trees, mut parts) = (Vec::new(), Vec::new());
         for (position, trial) in data.trials.iter().enumerate() {
-            trees.push(CallTree::new(trial, data.n_slots, decisions)?);
+            trees.push(CallTree::new(trial, data.n_slots, scoping)?);
             parts.push(parts_of(trial, specification)?);
             if trial.split == Split::Seen {
                 by_task.entry(&trial.task_id).or_default().push(position);
@@ -141,7 +141,7 @@ impl<'d> Examples<'d> {
             }
         }
         let levels = levels.into_values().collect();
-        Ok(Self { data, specification, parts, decisions, grain, trees, tasks, task_of_trial, levels })
+        Ok(Self { data, specification, parts, scoping, grain, trees, tasks, task_of_trial, levels })
     }
 
     /// The programs that decide, in the order of the program memory, and whether each is a root.
@@ -155,8 +155,8 @@ impl<'d> Examples<'d> {
     }
 
     /// What is learned.
-    pub fn decisions(&self) -> Decisions {
-        self.decisions
+    pub fn scoping(&self) -> ScopingKind {
+        self.scoping
     }
 
     /// The form of the specifications.
@@ -164,20 +164,23 @@ impl<'d> Examples<'d> {
         self.specification
     }
 
-    /// The rows of a trial's specification within a span: observations, or words as numbers.
-    pub fn specification_rows(&self, trial: usize, span: Span) -> Vec<f32> {
-        let TrialData { observations, instructions, .. } = &self.data.trials[trial];
-        let rows = span.begin as usize..span.end as usize;
+    /// A trial's specification within a span.
+    pub fn specification_rows(&self, trial: usize, span: Span) -> SpecificationRows {
         match self.specification {
-            SpecificationForm::Trajectories => {
-                let width = Observation::width(self.data.n_slots);
-                observations[rows.start * width..rows.end * width].to_vec()
-            }
+            SpecificationForm::Trajectories => SpecificationRows::Observations(self.observations(trial, span)),
             SpecificationForm::Instructions => {
-                instructions[rows].iter().flat_map(|instruction| instruction.words).map(f32::from).collect()
+                let said = &self.data.trials[trial].instructions[span.begin as usize..span.end as usize];
+                SpecificationRows::Sentences(said.iter().map(|instruction| instruction.words).collect())
             }
-            SpecificationForm::Video => (rows.start..rows.end).map(|frame| frame as f32).collect(),
+            SpecificationForm::Video => SpecificationRows::Pictures((span.begin..span.end).map(PictureIndex).collect()),
         }
+    }
+
+    /// The observations of some of a trial's frames.
+    pub(super) fn observations(&self, trial: usize, frames: Span) -> ObservationRows {
+        let width = Observation::width(self.data.n_slots);
+        let rows = frames.begin as usize * width..frames.end as usize * width;
+        ObservationRows::new(self.data.n_slots, self.data.trials[trial].observations[rows].to_vec())
     }
 
     /// The dataset behind.
@@ -243,16 +246,16 @@ impl<'d> Examples<'d> {
     pub fn example(&self, trial: usize, call: usize, demonstration: usize) -> Option<Example> {
         let calls = &self.data.trials[trial].calls;
         let decided = calls.get(call)?;
-        let own_caller = match self.decisions {
-            Decisions::Primitives => 0,
-            Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => decided.caller?.0 as usize,
+        let own_caller = match self.scoping {
+            ScopingKind::Primitives => 0,
+            ScopingKind::Scoped | ScopingKind::Unscoped | ScopingKind::Arguments => decided.caller?.0 as usize,
         };
         let parts = &self.parts[demonstration];
-        let window = match self.decisions {
-            Decisions::Scoped => parts[self.matching(trial, own_caller, demonstration)?]?,
-            Decisions::Unscoped | Decisions::Primitives | Decisions::Arguments => parts[0]?,
+        let window = match self.scoping {
+            ScopingKind::Scoped => parts[self.matching(trial, own_caller, demonstration)?]?,
+            ScopingKind::Unscoped | ScopingKind::Primitives | ScopingKind::Arguments => parts[0]?,
         };
-        let scope = if self.decisions.has_scopes() && decided.program.is_composite() {
+        let scope = if self.scoping.has_scopes() && decided.program.is_composite() {
             let part = parts[self.matching(trial, call, demonstration)?]?;
             Some(Span { begin: part.begin - window.begin, end: part.end - window.begin })
         } else {
@@ -265,13 +268,13 @@ impl<'d> Examples<'d> {
             trial,
             frame: decided.frames.begin as usize,
             callee: decided.program,
-            end_of_program: match self.decisions {
-                Decisions::Primitives => decided.program == Program::None,
-                Decisions::Scoped | Decisions::Unscoped | Decisions::Arguments => decided.end_of_program,
+            end_of_program: match self.scoping {
+                ScopingKind::Primitives => decided.program == Program::None,
+                ScopingKind::Scoped | ScopingKind::Unscoped | ScopingKind::Arguments => decided.end_of_program,
             },
             scope,
             arguments: self.arguments(calls, call),
-            given: self.given(trial, own_caller),
+            called_with: self.called_with(trial, own_caller),
             next_move: next.filter(|call| call.program == Program::MoveTo).and_then(|call| call.argument),
             involved: moves_below(calls, own_caller),
             last_decision: next.is_none(),
@@ -280,13 +283,13 @@ impl<'d> Examples<'d> {
 
     /// The callees of a trial's root that bring one slot to another, in order.
     pub(super) fn sub_tasks(&self, trial: usize) -> Vec<SubTask> {
-        let TrialData { calls, observations, .. } = &self.data.trials[trial];
-        let width = Observation::width(self.data.n_slots);
+        let calls = &self.data.trials[trial].calls;
         let sub_task = |(&call, moves): (&usize, &Vec<SlotIndex>)| {
             let (&[source, target], Some(shown)) = (moves.as_slice(), calls[call].output) else { return None };
             let part = self.parts[trial][call]?;
-            let last = &observations[shown.last() as usize * width..][..width];
-            let (upper, lower) = (position(last, source), position(last, target));
+            let last = self.observations(trial, Span { begin: shown.last(), end: shown.end });
+            let last = last.get(0)?;
+            let (upper, lower) = (last.position(source), last.position(target));
             let offset_m = std::array::from_fn(|axis| upper[axis] - lower[axis]);
             Some(SubTask { program: calls[call].program, source, target, part, offset_m })
         };
@@ -297,16 +300,17 @@ impl<'d> Examples<'d> {
     fn arguments(&self, calls: &[ProgramCall], call: usize) -> Vec<SlotIndex> {
         let own = calls[call].argument;
         let slots = own.map_or_else(|| moves_below(calls, call), |slot| vec![slot]);
-        let n_arguments = self.decisions.n_arguments_of(calls[call].program);
+        let n_arguments = self.scoping.n_arguments_of(calls[call].program);
         slots.into_iter().take(n_arguments).collect()
     }
 
     /// What a running call was called with: the root with its task, any other with slots.
-    fn given(&self, trial: usize, call: usize) -> Given {
-        let mut given = Given { task: self.task_of_trial[trial].filter(|_| call == 0), ..Given::default() };
+    fn called_with(&self, trial: usize, call: usize) -> CalledWith {
+        let task = self.task_of_trial[trial].filter(|_| call == 0);
+        let mut called_with = CalledWith { task, ..CalledWith::default() };
         let slots = self.arguments(&self.data.trials[trial].calls, call);
-        given.arguments.iter_mut().zip(slots).for_each(|(argument, slot)| *argument = Some(slot));
-        given
+        called_with.arguments.iter_mut().zip(slots).for_each(|(argument, slot)| *argument = Some(slot));
+        called_with
     }
 
     /// The call of `other` that does what a call of `trial` does.

@@ -11,8 +11,9 @@ use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use crate::model::Network;
+use crate::model::{Network, ReadError, TensorError, scalar, values};
 use crate::trace::ScopingLabel;
+use crate::training::TrainError;
 use crate::training::batch::{Group, Part};
 use crate::training::config::LossWeights;
 
@@ -55,6 +56,16 @@ pub struct Learner<M> {
     device: Device,
     optimizer: ModuleOptimizer,
     clip_norm: f32,
+}
+
+/// What comes of a step.
+pub struct Stepped<M, L> {
+    /// The learner after it.
+    pub learner: Learner<M>,
+    /// What was lost on each group.
+    pub losses: Vec<L>,
+    /// Whether the gradient was no number and was left out: the parameters follow earlier ones alone.
+    pub dropped: bool,
 }
 
 impl<M: Module + Sync> Learner<M> {
@@ -100,73 +111,99 @@ impl<M: Module + Sync> Learner<M> {
 
     /// Learns from groups. `lose` says what a module loses on a group, and what is to be differentiated; the former comes
     /// back in the groups' order.
-    #[must_use]
-    pub fn step<G: Sync, L: Send>(
+    ///
+    /// # Errors
+    ///
+    /// The first group's that cannot be learned from; nothing is learned then.
+    pub fn step<G: Sync, L: Send, E: Send + From<TensorError>>(
         self,
         groups: &[G],
         learning_rate: f64,
-        lose: impl Fn(&M, &G) -> (L, Option<Tensor<1>>) + Sync,
-    ) -> (Self, Vec<L>) {
+        lose: impl Fn(&M, &G) -> Result<(L, Option<Tensor<1>>), E> + Sync,
+    ) -> Result<Stepped<M, L>, E> {
         let copies: Vec<(M, &G)> = groups.iter().map(|group| (self.module.clone().fork(&self.device), group)).collect();
-        let results: Vec<(L, Vec<f32>)> = copies
+        let results: Vec<Result<(L, Vec<f32>), E>> = copies
             .par_iter()
             .map(|(module, group)| {
-                let (losses, total) = lose(module, group);
-                (losses, gradient(module, total))
+                let (losses, total) = lose(module, group)?;
+                Ok((losses, gradient(module, total)?))
             })
             .collect();
+        let results: Vec<(L, Vec<f32>)> = results.into_iter().collect::<Result<_, E>>()?;
         let mut sum = vec![0.0_f32; results.first().map_or(0, |(_, gradient)| gradient.len())];
         for (_, gradient) in &results {
             sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
         }
-        clip(&mut sum, self.clip_norm);
+        let dropped = !clip(&mut sum, self.clip_norm);
         let gradients = from_flat(&self.module, &sum);
         let Self { module, device, mut optimizer, clip_norm } = self;
         let module = optimizer.step(learning_rate, module, gradients);
-        (Self { module, device, optimizer, clip_norm }, results.into_iter().map(|(losses, _)| losses).collect())
+        let learner = Self { module, device, optimizer, clip_norm };
+        Ok(Stepped { learner, losses: results.into_iter().map(|(losses, _)| losses).collect(), dropped })
     }
 }
 
 /// The gradient of a loss in the order of the module's parameters.
-fn gradient<M: Module>(module: &M, total: Option<Tensor<1>>) -> Vec<f32> {
+fn gradient<M: Module>(module: &M, total: Option<Tensor<1>>) -> Result<Vec<f32>, TensorError> {
     let gradients = total.map(|total| GradientsParams::from_grads(total.backward(), module)).unwrap_or_default();
-    let mut flat = Flattener { gradients: &gradients, flat: Vec::new() };
+    let mut flat = Flattener { gradients: &gradients, flat: Ok(Vec::new()) };
     module.visit(&mut flat);
     flat.flat
 }
 
 /// Losses of a group's parts, and their sum.
+///
+/// # Errors
+///
+/// [`TrainError::NotFinite`] for the first part whose loss is no number in the step.
 pub(super) fn group_losses<N: Network>(
     network: &N,
     group: &Group,
     weights: LossWeights,
-) -> (Vec<Losses>, Option<Tensor<1>>) {
-    let percepts = network.perceive(&group.pictures);
-    let parts = group.parts.iter().map(|part| losses(network, part, &percepts, weights));
-    let (losses, totals): (Vec<Losses>, Vec<Tensor<1>>) = parts.unzip();
-    (losses, totals.into_iter().reduce(|sum, total| sum + total))
+    step: u32,
+) -> Result<(Vec<Losses>, Option<Tensor<1>>), TrainError> {
+    let percepts = network.perceive(&group.pictures)?;
+    let (mut of_parts, mut sum) = (Vec::with_capacity(group.parts.len()), None);
+    for part in &group.parts {
+        let (losses, total) = losses(network, part, &percepts, weights)?;
+        if !losses.total.is_finite() {
+            return Err(TrainError::NotFinite { step, level: part.program.name(), found: losses.total });
+        }
+        of_parts.push(losses);
+        sum = Some(sum.map_or_else(|| total.clone(), |sum: Tensor<1>| sum + total.clone()));
+    }
+    Ok((of_parts, sum))
 }
 
-/// Scales a gradient down to a norm that it exceeds. One that is not finite is dropped whole.
-fn clip(gradient: &mut [f32], largest_norm: f32) {
+/// Scales a gradient down to a norm that it exceeds. One that is not finite is dropped whole, and `false` returned.
+fn clip(gradient: &mut [f32], largest_norm: f32) -> bool {
     let norm = gradient.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt() as f32;
-    let scale = if norm.is_finite() { (largest_norm / norm.max(f32::MIN_POSITIVE)).min(1.0) } else { 0.0 };
-    if scale < 1.0 {
-        gradient.iter_mut().for_each(|value| *value = if value.is_finite() { *value * scale } else { 0.0 });
+    if !norm.is_finite() {
+        gradient.fill(0.0);
+        return false;
     }
+    let scale = (largest_norm / norm.max(f32::MIN_POSITIVE)).min(1.0);
+    if scale < 1.0 {
+        gradient.iter_mut().for_each(|value| *value *= scale);
+    }
+    true
 }
 
 /// Losses of a part, and the weighed sum to differentiate. `percepts` are those of its group's pictures.
+///
+/// # Errors
+///
+/// [`ReadError`] when the network cannot read the part, or its numbers cannot be read.
 pub fn losses<N: Network>(
     network: &N,
     part: &Part,
     percepts: &N::Percepts,
     weights: LossWeights,
-) -> (Losses, Tensor<1>) {
+) -> Result<(Losses, Tensor<1>), ReadError> {
     let device = network.device();
     let n_batch = part.ends.len();
-    let demonstration = network.demonstration(&part.windows, percepts);
-    let reading = network.read(&demonstration, &part.states, percepts, &part.given);
+    let demonstration = network.demonstration(&part.windows, percepts)?;
+    let reading = network.read(&demonstration, &part.states, percepts, &part.called_with)?;
     let (core, _) = network.core(&reading, part.program, &part.steps, None);
     let programs = TensorData::new(part.programs.clone(), core.programs.dims());
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
@@ -180,7 +217,8 @@ pub fn losses<N: Network>(
         cross_entropy(labels, targets)
     });
     let argument = part.arguments.as_ref().map(|targets| {
-        let targets = TensorData::new(targets.clone(), [n_batch * N::DECISIONS.n_arguments(), part.windows.n_slots()]);
+        let targets =
+            TensorData::new(targets.clone(), [n_batch * network.scoping().n_arguments(), part.windows.n_slots()]);
         cross_entropy(network.argument(&reading, part.program, &core), Tensor::from_data(targets, &device))
     });
     let weighed = [(&scope, weights.scope), (&argument, weights.argument)];
@@ -188,13 +226,13 @@ pub fn losses<N: Network>(
         total = total + loss.mul_scalar(weight);
     }
     let losses = Losses {
-        program: program.into_scalar(),
-        end: end.into_scalar(),
-        scope: scope.map(Tensor::into_scalar),
-        argument: argument.map(Tensor::into_scalar),
-        total: total.clone().into_scalar(),
+        program: scalar(program)?,
+        end: scalar(end)?,
+        scope: scope.map(scalar).transpose()?,
+        argument: argument.map(scalar).transpose()?,
+        total: scalar(total.clone())?,
     };
-    (losses, total)
+    Ok((losses, total))
 }
 
 /// Summed over everything; targets carry the weights.
@@ -211,15 +249,16 @@ fn binary_cross_entropy(logits: Tensor<2>, targets: Tensor<2>) -> Tensor<1> {
 /// Gradients as one list; zeros for parameters that took no part.
 struct Flattener<'g> {
     gradients: &'g GradientsParams,
-    flat: Vec<f32>,
+    flat: Result<Vec<f32>, TensorError>,
 }
 
 impl ModuleVisitor for Flattener<'_> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let gradient = self.gradients.get::<D>(param.id).and_then(|gradient| gradient.into_data().try_into_vec().ok());
-        match gradient {
-            Some(gradient) => self.flat.extend::<Vec<f32>>(gradient),
-            None => self.flat.resize(self.flat.len() + param.shape().num_elements(), 0.0),
+        let Ok(flat) = &mut self.flat else { return };
+        match self.gradients.get::<D>(param.id).map(values).transpose() {
+            Ok(Some(gradient)) => flat.extend(gradient),
+            Ok(None) => flat.resize(flat.len() + param.shape().num_elements(), 0.0),
+            Err(error) => self.flat = Err(error),
         }
     }
 }
@@ -243,4 +282,26 @@ fn from_flat<N: Module>(network: &N, flat: &[f32]) -> GradientsParams {
     let mut unflattener = Unflattener { flat, gradients: GradientsParams::new() };
     network.visit(&mut unflattener);
     unflattener.gradients
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clip;
+
+    #[test]
+    fn a_gradient_is_scaled_down_to_a_norm_that_it_exceeds() {
+        let (mut long, mut short) = ([3.0, 4.0], [0.3, 0.4]);
+        assert!(clip(&mut long, 1.0) && clip(&mut short, 1.0));
+        assert!((long[0] - 0.6).abs() < 1e-6 && (long[1] - 0.8).abs() < 1e-6, "{long:?}");
+        assert_eq!(short, [0.3, 0.4]);
+    }
+
+    #[test]
+    fn a_gradient_that_is_no_number_is_dropped_whole_and_told_of() {
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let mut gradient = [1.0, wrong];
+            assert!(!clip(&mut gradient, 5.0));
+            assert_eq!(gradient, [0.0, 0.0]);
+        }
+    }
 }

@@ -12,11 +12,11 @@
 
 use rand::Rng;
 
-use crate::program::Program;
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
-use crate::trace::Span;
+use crate::trace::{ObservationRowMut, Span};
 use crate::training::examples::Example;
+use crate::training::sub_task::SubTask;
 
 /// How far from its place, in x and in y, what falls comes to lie, in metres.
 const FALL_M: f32 = 0.25;
@@ -24,29 +24,19 @@ const FALL_M: f32 = 0.25;
 const APART_M: f32 = 0.055;
 /// Places that are tried for what falls.
 const MAX_TRIES: usize = 16;
-/// How far a pair may be from where the demonstration leaves it, horizontally and in height, in metres.
-const SAME_M: [f32; 2] = [0.045, 0.01];
 /// How often the gripper has given way to what toppled the tower: it hovers then.
 const GIVES_WAY: f32 = 0.75;
 
-/// A callee of the root: what it brings to what, and how they are to each other then.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct SubTask {
-    pub(super) program: Program,
-    pub(super) source: SlotIndex,
-    pub(super) target: SlotIndex,
-    /// Its part of the demonstration.
-    pub(super) part: Span,
-    /// From the target to the source at its end, in metres.
-    pub(super) offset_m: [f32; 3],
-}
-
 /// Topples what rests on one of the finished sub-tasks' targets and labels the decision anew. Nothing happens while
 /// nothing is built, or while something is held.
-pub(super) fn knock_over(sub_tasks: &[SubTask], example: &mut Example, state: &mut [f32], rng: &mut impl Rng) {
-    let done: Vec<&SubTask> = sub_tasks.iter().filter(|sub_task| sub_task.holds(state)).collect();
-    let is_open = state[state.len() - 2] > 0.5;
-    if done.is_empty() || !is_open {
+pub(super) fn knock_over(
+    sub_tasks: &[SubTask],
+    example: &mut Example,
+    state: &mut ObservationRowMut<'_>,
+    rng: &mut impl Rng,
+) {
+    let done: Vec<&SubTask> = sub_tasks.iter().filter(|sub_task| sub_task.holds(state.as_row())).collect();
+    if done.is_empty() || !state.as_row().is_open() {
         return;
     }
     let lowest = done[rng.random_range(0..done.len())];
@@ -54,34 +44,15 @@ pub(super) fn knock_over(sub_tasks: &[SubTask], example: &mut Example, state: &m
         scatter(slot, state, rng);
     }
     if rng.random::<f32>() < GIVES_WAY {
-        let n_coordinates = 3 * n_slots(state.len());
-        state[..n_coordinates].chunks_exact_mut(3).for_each(|position| position[2] -= HOVER_M - GRASP_M);
+        state.positions.iter_mut().for_each(|position| position[2] -= HOVER_M - GRASP_M);
     }
-    let Some(next) = sub_tasks.iter().find(|sub_task| !sub_task.holds(state)) else { return };
+    let Some(next) = sub_tasks.iter().find(|sub_task| !sub_task.holds(state.as_row())) else { return };
     example.callee = next.program;
     example.end_of_program = false;
     example.scope =
         Some(Span { begin: next.part.begin - example.window.begin, end: next.part.end - example.window.begin });
     example.next_move = Some(next.source);
     example.last_decision = false;
-}
-
-impl SubTask {
-    fn holds(&self, state: &[f32]) -> bool {
-        let (source, target) = (position(state, self.source), position(state, self.target));
-        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| source[axis] - target[axis] - self.offset_m[axis]);
-        x.hypot(y) <= SAME_M[0] && z.abs() <= SAME_M[1]
-    }
-}
-
-fn n_slots(width: usize) -> usize {
-    (width - 2) / 3
-}
-
-/// Where a slot is in an observation's row.
-pub(super) fn position(row: &[f32], slot: SlotIndex) -> [f32; 3] {
-    let first = 3 * usize::from(slot.0);
-    [row[first], row[first + 1], row[first + 2]]
 }
 
 /// A slot and all that rests on it, from below.
@@ -96,11 +67,11 @@ fn resting_on(slot: SlotIndex, done: &[&SubTask]) -> Vec<SlotIndex> {
 }
 
 /// Puts a slot on the table beside where it was, apart from all others where there is room.
-fn scatter(slot: SlotIndex, state: &mut [f32], rng: &mut impl Rng) {
-    let n_slots = n_slots(state.len());
-    let [x, y, _] = position(state, slot);
+fn scatter(slot: SlotIndex, state: &mut ObservationRowMut<'_>, rng: &mut impl Rng) {
+    let slot = usize::from(slot.0);
+    let [x, y, _] = state.positions[slot];
     let others: Vec<[f32; 3]> =
-        (0..n_slots as u16).map(SlotIndex).filter(|&other| other != slot).map(|other| position(state, other)).collect();
+        state.positions.iter().enumerate().filter(|&(other, _)| other != slot).map(|(_, at)| *at).collect();
     let table_z = others.iter().map(|other| other[2]).fold(f32::MAX, f32::min);
     let mut place = [x, y];
     for _ in 0..MAX_TRIES {
@@ -110,16 +81,29 @@ fn scatter(slot: SlotIndex, state: &mut [f32], rng: &mut impl Rng) {
         }
     }
     let [x, y] = place;
-    state[3 * usize::from(slot.0)..][..3].copy_from_slice(&[x, y, table_z]);
+    state.positions[slot] = [x, y, table_z];
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::program::Program;
     use crate::seed::Seed;
+    use crate::trace::{Observation, ObservationRows};
 
     /// Slots 0, 1 and 2 as a tower from below, 3 on the table; the gripper is open.
-    const TOWER: [f32; 14] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.0, 0.0, 0.1, 0.2, 0.0, 0.0, 1.0, 0.0];
+    fn tower() -> Observation {
+        Observation { slots_m: vec![[0.0; 3], [0.0, 0.0, 0.05], [0.0, 0.0, 0.1], [0.2, 0.0, 0.0]], closed: false }
+    }
+
+    /// What becomes of a state and its decision.
+    fn knocked_over(sub_tasks: &[SubTask], state: &Observation, seed: u64) -> (Example, ObservationRows) {
+        let (mut example, mut state) = (decision(), ObservationRows::of(4, [state]));
+        for mut row in state.iter_mut() {
+            knock_over(sub_tasks, &mut example, &mut row, &mut Seed(seed).rng());
+        }
+        (example, state)
+    }
 
     /// 1 on 0, 2 on 1, 3 on 2: the last is not done.
     fn sub_tasks() -> Vec<SubTask> {
@@ -143,7 +127,7 @@ mod tests {
             end_of_program: false,
             scope: Some(Span { begin: 8, end: 13 }),
             arguments: Vec::new(),
-            given: crate::model::Given::default(),
+            called_with: crate::model::CalledWith::default(),
             next_move: Some(SlotIndex(3)),
             involved: (0..4).map(SlotIndex).collect(),
             last_decision: false,
@@ -155,15 +139,15 @@ mod tests {
         let sub_tasks = sub_tasks();
         let mut first = [false; 3];
         for seed in 0..50 {
-            let (mut example, mut state) = (decision(), TOWER);
-            knock_over(&sub_tasks, &mut example, &mut state, &mut Seed(seed).rng());
-            let table_z = state[2];
+            let (example, state) = knocked_over(&sub_tasks, &tower(), seed);
+            let state = state.get(0).unwrap();
+            let table_z = state.positions[0][2];
             let next = example.next_move.unwrap();
             assert!(next.0 == 1 || next.0 == 2, "3 was next before");
             first[usize::from(next.0)] = true;
             assert_eq!(example.scope, Some(sub_tasks[usize::from(next.0) - 1].part));
             for toppled in next.0..3 {
-                let [x, y, z] = position(&state, SlotIndex(toppled));
+                let [x, y, z] = state.position(SlotIndex(toppled));
                 assert!((z - table_z).abs() < 1e-6, "it lies on the table");
                 assert!(x.hypot(y) >= APART_M - 1e-6, "apart from what still stands");
             }
@@ -182,22 +166,21 @@ mod tests {
             last_decision: true,
             ..decision()
         };
-        knock_over(sub_tasks, &mut example, &mut TOWER.clone(), &mut Seed(3).rng());
+        for mut row in ObservationRows::of(4, [&tower()]).iter_mut() {
+            knock_over(sub_tasks, &mut example, &mut row, &mut Seed(3).rng());
+        }
         assert_eq!((example.callee, example.end_of_program), (Program::PickAndPlace, false));
         assert!(example.scope.is_some() && !example.last_decision);
     }
 
     #[test]
     fn nothing_is_knocked_over_where_nothing_is_built_or_something_is_held() {
-        let mut flat = TOWER;
-        flat[3] = 0.1;
-        flat[6] = -0.1;
-        let mut holding = TOWER;
-        holding[12..].copy_from_slice(&[0.0, 1.0]);
+        let mut flat = tower();
+        flat.slots_m[1][0] = 0.1;
+        flat.slots_m[2][0] = -0.1;
+        let holding = Observation { closed: true, ..tower() };
         for before in [flat, holding] {
-            let (mut example, mut state) = (decision(), before);
-            knock_over(&sub_tasks(), &mut example, &mut state, &mut Seed(1).rng());
-            assert_eq!((example, state), (decision(), before));
+            assert_eq!(knocked_over(&sub_tasks(), &before, 1), (decision(), ObservationRows::of(4, [&before])));
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::model::{ModelConfig, Network};
 use crate::seed::Seed;
 use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
 use crate::training::curriculum::LevelErrors;
-use crate::training::learner::group_losses;
+use crate::training::learner::{Stepped, group_losses};
 use crate::training::{
     Examples, Gallery, Group, Hooks, Learner, Losses, Metric, Part, Progress, TrainConfig, TrainError, TrainSummary,
     draw, seen,
@@ -54,8 +54,8 @@ pub(super) struct Trained {
 
 impl Trained {
     pub(super) fn summary(self) -> TrainSummary {
-        let Standing { step, examples, metrics, errors: _ } = self.standing;
-        TrainSummary { steps: step, examples, resumed_at: self.resumed_at, metrics }
+        let Standing { step, examples, dropped_gradients, metrics, errors: _ } = self.standing;
+        TrainSummary { steps: step, examples, dropped_gradients, resumed_at: self.resumed_at, metrics }
     }
 }
 
@@ -93,10 +93,10 @@ impl Run<'_> {
     /// Before the first step.
     fn begin<N: Network>(&self, learner: Learner<N>) -> Result<Resumed<N, Standing>, TrainError> {
         let errors = LevelErrors::new(self.examples.levels().count());
-        let standing = Standing { step: 0, examples: 0, errors, metrics: Vec::new() };
+        let standing = Standing { step: 0, examples: 0, dropped_gradients: 0, errors, metrics: Vec::new() };
         let Some(gallery) = self.gallery else { return Ok(Resumed { learner, standing }) };
         let (sample, _) = seen::sample(self.examples.data(), gallery)?;
-        let network = learner.module().clone().acquainted(&sample, self.seed.derive("acquainted", &[]));
+        let network = learner.module().clone().calibrated(&sample, self.seed.derive("acquainted", &[]))?;
         Ok(Resumed { learner: learner.with_module(network), standing })
     }
 
@@ -111,10 +111,12 @@ impl Run<'_> {
         let groups = self.draw(&sizes, step_seed)?;
         self.announce(standing.step + 1);
         let weights = self.config.loss;
-        let lose = |network: &N, group: &Group| group_losses(network, group, weights);
-        let (learner, losses) = learner.step(&groups, learning_rate, lose);
+        let step = standing.step + 1;
+        let lose = |network: &N, group: &Group| group_losses(network, group, weights, step);
+        let Stepped { learner, losses, dropped } = learner.step(&groups, learning_rate, lose)?;
         let losses = losses.concat();
-        standing.step += 1;
+        standing.step = step;
+        standing.dropped_gradients += u32::from(dropped);
         let parts: Vec<&Part> = groups.iter().flat_map(|group| &group.parts).collect();
         let mut total = 0.0;
         for (batch_idx, &level) in chosen.iter().enumerate() {
@@ -137,11 +139,12 @@ impl Run<'_> {
         if let Some(gallery) = self.gallery {
             return seen::draw_seen(self.examples, gallery, self.config, sizes, seen_seed(seed));
         }
-        let batches = sizes.iter().enumerate().flat_map(|(batch_idx, &(level, size))| {
-            let parts = draw(self.examples, self.config, level, size, seed.derive("batch", &[batch_idx as u64]));
-            parts.into_iter().map(move |part| Group::from(Part { batch_idx, ..part }))
-        });
-        Ok(batches.collect())
+        let mut groups = Vec::new();
+        for (batch_idx, &(level, size)) in sizes.iter().enumerate() {
+            let parts = draw(self.examples, self.config, level, size, seed.derive("batch", &[batch_idx as u64]))?;
+            groups.extend(parts.into_iter().map(|part| Group::from(Part { batch_idx, ..part })));
+        }
+        Ok(groups)
     }
 
     /// Lets pictures be made ready for a step while the one before it is computed.

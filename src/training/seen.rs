@@ -8,9 +8,8 @@ use std::collections::BTreeMap;
 use rand::Rng;
 
 use crate::dataset::{DatasetTrials, Wanted};
-use crate::model::{PictureSample, Pictures};
+use crate::model::{PictureIndex, PictureSample, Pictures, SpecificationRows, States};
 use crate::seed::Seed;
-use crate::trace::SpecificationForm;
 use crate::training::TrainError;
 use crate::training::augment::Views;
 use crate::training::batch::{Counts, Group, Run, assemble};
@@ -23,7 +22,7 @@ const GROUPS: usize = 2;
 const TASKS_OF_GROUP: usize = 3;
 /// How often a pair of trials is drawn in which a level's program runs.
 const DRAWS: usize = 100;
-/// Trials whose pictures a network gets acquainted with.
+/// Trials whose pictures a network is calibrated with.
 const SAMPLE_TRIALS: usize = 40;
 
 /// The pictures behind the frames of trials.
@@ -92,7 +91,7 @@ pub(super) fn draw_seen(
         let counts = Counts::of(views.iter().flatten());
         for (views, group) in views.into_iter().zip(&mut parts).filter(|(views, _)| !views.is_empty()) {
             let runs = views.into_iter().map(|views| Run { decisions: vec![views] }).collect();
-            let part = assemble(examples, level_idx, runs, counts);
+            let part = assemble(examples, level_idx, runs, counts)?;
             group.parts.push(crate::training::batch::Part { batch_idx, ..part });
         }
     }
@@ -123,7 +122,7 @@ fn draw_group(
 /// The pictures that a group's decisions look at, numbered.
 struct Shown {
     /// By trial and frame.
-    numbers: BTreeMap<(usize, usize), usize>,
+    numbers: BTreeMap<(usize, usize), u32>,
 }
 
 impl Shown {
@@ -134,7 +133,7 @@ impl Shown {
             numbers.extend(window.map(|frame| ((example.demonstration, frame), 0)));
             numbers.insert((example.trial, example.frame), 0);
         }
-        numbers.values_mut().enumerate().for_each(|(number, of_frame)| *of_frame = number);
+        numbers.values_mut().zip(0..).for_each(|(of_frame, number)| *of_frame = number);
         Self { numbers }
     }
 
@@ -150,17 +149,18 @@ impl Shown {
         Ok(Group { pictures, parts: Vec::new() })
     }
 
-    fn number(&self, trial: usize, frame: usize) -> f32 {
-        self.numbers.get(&(trial, frame)).copied().unwrap_or_default() as f32
+    fn picture(&self, trial: usize, frame: usize) -> PictureIndex {
+        PictureIndex(self.numbers[&(trial, frame)])
     }
 
     fn views(&self, examples: &Examples<'_>, example: Example) -> Views {
         let window = example.window.begin as usize..example.window.end as usize;
         Views {
             n_slots: examples.data().n_slots,
-            specification: SpecificationForm::Video,
-            window: window.map(|frame| self.number(example.demonstration, frame)).collect(),
-            state: vec![self.number(example.trial, example.frame)],
+            window: SpecificationRows::Pictures(
+                window.map(|frame| self.picture(example.demonstration, frame)).collect(),
+            ),
+            state: States::Pictures(vec![self.picture(example.trial, example.frame)]),
             example,
         }
     }

@@ -48,7 +48,7 @@ pub(super) fn title(replay: &Replay<'_>, at: usize, camera: &CameraConfig) -> St
 /// Whether an episode was acted by a policy that is given pictures.
 fn sees(episode: &Episode) -> bool {
     let Actor::Policy(name) = &episode.provenance.actor else { return false };
-    Variant::ALL.iter().any(|variant| variant.name() == name && variant.sees())
+    name.parse().is_ok_and(Variant::sees)
 }
 
 fn put_camera(

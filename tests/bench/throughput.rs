@@ -93,7 +93,7 @@ fn train_convolutions() {
     (0..BATCH).for_each(|n| {
         pictures.push(&(0..64 * 64 * 3).map(|at| value(n, at)).collect::<Vec<u8>>(), GripperState::default());
     });
-    let step = || drop(network.perceive(&pictures).powf_scalar(2.0).sum().backward());
+    let step = || drop(network.perceive(&pictures).expect("it reads").powf_scalar(2.0).sum().backward());
     step();
     let ((), secs) = cpu_secs(|| (0..STEPS).for_each(|_| step()));
     report("train_convolutions_64", (STEPS * BATCH) as f64 / secs, "pictures per CPU-second");
@@ -251,7 +251,7 @@ impl Bench {
     /// Decisions learned from in training, batch building included.
     fn train_samples(&self, trials: &DatasetTrials) {
         let config = TrainConfig { steps: Some(60), checkpoint_every: 1000, ..TrainConfig::default() };
-        let training = Training { variant: Variant::Ntp, specification: SpecificationForm::default(), seed: 0, config };
+        let training = Training { variant: Variant::NTP, specification: SpecificationForm::default(), seed: 0, config };
         let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
         let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join("model"), &mut hooks));
         let summary = summary.expect("training goes well");
@@ -268,7 +268,7 @@ impl Bench {
         let demonstration_of = |task: &Task| demonstration(task, &trial(task, 90, 1), 0, 0);
         let query = first_query(&demonstration_of(task));
         for _ in 0..200 {
-            policy.decide(std::slice::from_ref(&query));
+            policy.decide(std::slice::from_ref(&query)).expect("it decides");
         }
         let n_steps = 2000;
         let (_, secs) = cpu_secs(|| (0..n_steps).for_each(|_| drop(policy.decide(std::slice::from_ref(&query)))));

@@ -9,9 +9,9 @@ use burn::tensor::Device;
 use ntp::dataset::{DatasetTrials, Wanted};
 use ntp::geometry::{Vec3, upright};
 use ntp::model::{
-    ColourSlotsConfig, Decoder, Detector, Given, ModelConfig, Network, NetworkUse, Pictures, PointDetector,
-    PointDetectorConfig, Variant, VggDetector, VggDetectorConfig, WEIGHTS_FILE, Windows, detected_rows, detector_of,
-    with_network,
+    CalledWith, ColourSlotsConfig, Decoder, Detector, ModelConfig, Network, NetworkUse, PictureIndex, Pictures,
+    PointDetector, PointDetectorConfig, ReadError, SpecificationRows, States, Variant, VggDetector, VggDetectorConfig,
+    WEIGHTS_FILE, Windows, detected_rows, detector_of, with_network,
 };
 use ntp::program::Program;
 use ntp::render::{Camera, Visibility};
@@ -20,10 +20,10 @@ use ntp::scene::{BodyIndex, Scene, SceneState};
 use ntp::seed::Seed;
 use ntp::table::read;
 use ntp::task::{Family, Split, initial_state, scene};
-use ntp::trace::{Episode, GripperState, SpecificationForm};
+use ntp::trace::{Episode, GripperState, ObservationRows, SpecificationForm};
 use ntp::training::{
     DETECTOR_METRICS, DETECTOR_METRICS_FILE, DetectorTraining, Gallery, Hooks, Progress, TrainConfig, TrainError,
-    TrainSummary, Training, train_seeing,
+    TrainSummary, Training, train_on_pictures,
 };
 
 use crate::kinematic::{demonstration, tower, trial};
@@ -53,7 +53,7 @@ fn learn(
     let done = AtomicU32::new(0);
     let mut on_progress = |progress: Progress| done.store(progress.step, Ordering::Relaxed);
     let should_stop = || stop_after.is_some_and(|after| done.load(Ordering::Relaxed) >= after);
-    train_seeing(
+    train_on_pictures(
         training,
         data,
         Some(paintings),
@@ -73,7 +73,7 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     let folder = tempfile::tempdir().unwrap();
     let detector = DetectorTraining { steps: Some(250), pictures: Some(48), ..Default::default() };
     let shown = shown(6);
-    let training = training(Variant::NtpVidDetector, 2, detector);
+    let training = training(Variant::NTP_VID_DETECTOR, 2, detector);
     assert_eq!(learn(&training, &shown, folder.path(), None).unwrap().steps, 2);
     let curve = curve(folder.path());
     assert_eq!(curve.len(), 250);
@@ -83,7 +83,7 @@ fn a_detector_learns_positions_before_the_network_behind_it_learns_anything() {
     let (_, policy) = load_policy(folder.path(), Decoder::Mss).unwrap();
     let mut pictures = Painter::nothing();
     shown.1.show(0, &[0, 1, 2], &mut pictures);
-    let found = policy.detect(&pictures).unwrap();
+    let found = policy.detect(&pictures).unwrap().unwrap().into_values();
     let truth = &shown.0.trials[0].observations[..found.len()];
     let mean = found.iter().zip(truth).map(|(found, truth)| (found - truth).abs()).sum::<f32>() / found.len() as f32;
     assert!(mean < 0.05, "{mean} m");
@@ -121,8 +121,14 @@ fn a_finished_detector_looks_at_all_trials_a_portion_at_a_time() {
     let detector = DetectorTraining { steps: Some(2), pictures: Some(8), ..Default::default() };
     let folder = tempfile::tempdir().unwrap();
     let mut hooks = Hooks { on_progress: &mut |_| (), should_stop: &|| false };
-    train_seeing(&training(Variant::NtpVidDetector, 1, detector), &data, Some(&watched), folder.path(), &mut hooks)
-        .unwrap();
+    train_on_pictures(
+        &training(Variant::NTP_VID_DETECTOR, 1, detector),
+        &data,
+        Some(&watched),
+        folder.path(),
+        &mut hooks,
+    )
+    .unwrap();
     let announced = watched.announced.into_inner().unwrap();
     assert!(announced.iter().all(|trials| trials.len() < 70), "all at once");
     assert_eq!(announced.iter().flatten().filter(|wanted| wanted.position == 139).count(), 1);
@@ -143,7 +149,8 @@ fn with_gripper_moved(by: [f32; 3]) -> [Pictures; 2] {
 
 fn assert_detections_move_with_the_gripper<D: Detector>(detector: &D) {
     let by = [0.25, -0.5, 0.125];
-    let [still, moved] = with_gripper_moved(by).map(|pictures| detected_rows(detector, &pictures));
+    let [still, moved] =
+        with_gripper_moved(by).map(|pictures| detected_rows(detector, &pictures, 8).unwrap().into_values());
     assert_eq!(still.len(), 3 * 26);
     for (still, moved) in still.chunks(26).zip(moved.chunks(26)) {
         for (at, (still, moved)) in still.iter().zip(moved).take(24).enumerate() {
@@ -182,9 +189,13 @@ impl NetworkUse for Decided<'_> {
     type Output = Vec<f32>;
 
     fn run<N: Network>(self, network: N) -> Vec<f32> {
-        let percepts = network.perceive(self.0);
-        let demonstration = network.demonstration(&Windows::of_pictures(8, &[&[0.0, 1.0]]), &percepts);
-        let reading = network.read(&demonstration, &[2.0], &percepts, &[Given::default()]);
+        let percepts = network.perceive(self.0).unwrap();
+        let shown = SpecificationRows::Pictures([0, 1].map(PictureIndex).to_vec());
+        let demonstration = network.demonstration(&Windows::new(8, &[&shown]).unwrap(), &percepts).unwrap();
+        let now = States::Pictures(vec![PictureIndex(2)]);
+        let reading = network.read(&demonstration, &now, &percepts, &[CalledWith::default()]).unwrap();
+        let beyond = network.read(&demonstration, &States::Pictures(vec![PictureIndex(3)]), &percepts, &[]);
+        assert_eq!(beyond.err(), Some(ReadError::Picture { found: 3, n: 3 }));
         let (core, _) = network.core(&reading, Program::BlockStacking, &[1], None);
         let argument = network.argument(&reading, Program::BlockStacking, &core);
         let values =
@@ -196,13 +207,13 @@ impl NetworkUse for Decided<'_> {
 #[test]
 fn no_network_but_one_behind_a_detector_reads_the_gripper_s_state() {
     let [still, moved] = with_gripper_moved([0.25, -0.5, 0.125]);
-    let end_to_end = [Variant::NtpVidE2e, Variant::NtpVidE2ePaper, Variant::NtpVidE2eGeneral];
-    for variant in end_to_end.into_iter().chain([Variant::NtpVidDetector, Variant::NtpVidDetectorPaper]) {
+    let end_to_end = [Variant::NTP_VID_E2E, Variant::NTP_VID_E2E_PAPER, Variant::NTP_VID_E2E_GENERAL];
+    for variant in end_to_end.into_iter().chain([Variant::NTP_VID_DETECTOR, Variant::NTP_VID_DETECTOR_PAPER]) {
         let mut config =
             ModelConfig::new(variant, SpecificationForm::Video, Family::BlockStacking, 8, serde_json::Value::Null);
-        config.network = config.network.seeing(64, 8).narrowed(32);
-        let [a, b] =
-            [&still, &moved].map(|pictures| with_network(&config, Seed(1), &Device::flex(), Decided(pictures)));
+        config.network = config.network.for_pictures(64, 8).narrowed(32);
+        let [a, b] = [&still, &moved]
+            .map(|pictures| with_network(&config, Seed(1), &Device::flex(), Decided(pictures)).unwrap());
         assert_eq!(a == b, end_to_end.contains(&variant), "{variant}");
     }
 }
@@ -220,7 +231,7 @@ fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     let folder = tempfile::tempdir().unwrap();
     let detector =
         DetectorTraining { steps: Some(200), pictures: Some(16), learning_rate: Some(0.002), narrowed: Some(16) };
-    learn(&training(Variant::NtpVidDetectorPaper, 1, detector), &shown(2), folder.path(), None).unwrap();
+    learn(&training(Variant::NTP_VID_DETECTOR_PAPER, 1, detector), &shown(2), folder.path(), None).unwrap();
     let curve = curve(folder.path());
     let [begin, end] = [&curve[..5], &curve[195..]].map(|part| part.iter().sum::<f32>() / 5.0);
     assert!(end < 0.75 * begin, "from {begin} to {end} m");
@@ -230,7 +241,7 @@ fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
 fn a_training_that_was_stopped_in_either_part_comes_to_the_same_weights() {
     let shown = shown(3);
     let detector = DetectorTraining { steps: Some(4), pictures: Some(12), ..Default::default() };
-    let training = training(Variant::NtpVidDetector, 4, detector);
+    let training = training(Variant::NTP_VID_DETECTOR, 4, detector);
     let whole = tempfile::tempdir().unwrap();
     learn(&training, &shown, whole.path(), None).unwrap();
     for stop_after in [2, 6] {
@@ -254,7 +265,7 @@ fn a_detector_learns_the_same_for_any_number_of_threads() {
         let folder = tempfile::tempdir().unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let detector = DetectorTraining { steps: Some(3), pictures: Some(12), ..Default::default() };
-        pool.install(|| learn(&training(Variant::NtpVidDetector, 1, detector), &shown, folder.path(), None)).unwrap();
+        pool.install(|| learn(&training(Variant::NTP_VID_DETECTOR, 1, detector), &shown, folder.path(), None)).unwrap();
         std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
     };
     assert!(weights(1) == weights(2));
@@ -266,20 +277,20 @@ fn wrong_settings_of_a_detector_are_named_with_what_is_allowed() {
         assert_eq!(training(variant, 1, detector).check().unwrap_err().to_string(), expected);
     };
     let some = DetectorTraining { steps: Some(1), ..Default::default() };
-    check(Variant::NtpVidE2e, some, "detector is set for variant ntp_vid_e2e; allowed: variants with a detector");
+    check(Variant::NTP_VID_E2E, some, "detector is set for variant ntp_vid_e2e; allowed: variants with a detector");
     let colours = |variant, colours| {
         let config = TrainConfig { colours: Some(colours), ..TrainConfig::default() };
         Training { config, ..training(variant, 1, DetectorTraining::default()) }.check().unwrap_err().to_string()
     };
-    assert_eq!(colours(Variant::NtpVidE2e, 1), "colours is 1; allowed: 2 to 64");
-    let paper = colours(Variant::NtpVidE2ePaper, 9);
+    assert_eq!(colours(Variant::NTP_VID_E2E, 1), "colours is 1; allowed: 2 to 64");
+    let paper = colours(Variant::NTP_VID_E2E_PAPER, 9);
     assert_eq!(paper, "colours is 9 for variant ntp_vid_e2e_paper; allowed: variants on colour slots");
     let none = DetectorTraining { pictures: Some(0), ..Default::default() };
-    check(Variant::NtpVidDetector, none, "detector.pictures is 0; allowed: at least 1");
+    check(Variant::NTP_VID_DETECTOR, none, "detector.pictures is 0; allowed: at least 1");
     let narrow = DetectorTraining { narrowed: Some(65), ..Default::default() };
-    check(Variant::NtpVidDetectorPaper, narrow, "detector.narrowed is 65; allowed: 1 (full width) to 64");
+    check(Variant::NTP_VID_DETECTOR_PAPER, narrow, "detector.narrowed is 65; allowed: 1 (full width) to 64");
     let rate = DetectorTraining { learning_rate: Some(0.0), ..Default::default() };
-    check(Variant::NtpVidDetector, rate, "detector.learning_rate is 0; allowed: greater than 0");
+    check(Variant::NTP_VID_DETECTOR, rate, "detector.learning_rate is 0; allowed: greater than 0");
 }
 
 /// Two blocks before the front camera, and the others far behind it.
@@ -319,6 +330,7 @@ fn errors_of_detections_are_told_of_what_moves_with_the_frames_that_they_are_of(
     rows[3 * 2 + 1] += 0.25;
     let shares = vec![vec![0.5; 8]; n_frames];
     let mut table = DetectionRows::default();
+    let rows = ObservationRows::new(8, rows);
     let detected = Detected { episode: 3, demonstration: &episode, rows: &rows, visible_shares: &shares };
     table.push("ntp_vid_detector", "stacking_unseen", &Acted { train_tasks: Some(7), ..Acted::default() }, &detected);
     let folder = tempfile::tempdir().unwrap();

@@ -7,18 +7,21 @@
 use burn::module::{ModuleMapper, Param};
 use burn::tensor::{Device, Tensor};
 use ntp::model::{
-    FlattenedConfig, Given, InstructedConfig, ModelConfig, Network, NetworkConfig, NetworkUse, ObjectCentricConfig,
-    Pictures, Variant, Windows, with_network,
+    CalledWith, FlattenedConfig, InstructedConfig, ModelConfig, Network, NetworkConfig, NetworkUse,
+    ObjectCentricConfig, Pictures, SpecificationRows, States, Variant, Windows, with_network,
 };
 use ntp::program::Program;
 use ntp::seed::Seed;
 use ntp::task::Family;
-use ntp::trace::SpecificationForm;
+use ntp::trace::{ObservationRows, SpecificationForm, Words};
+
+/// Two words, as numbers; none of a third.
+const SENTENCE: Words = [1, 2, 0];
 
 /// x, y, z, open, closed.
-const ROW: [f32; 5] = [0.0, 0.0, 0.0, 1.0, 0.0];
-/// Two words, as numbers; none of a third.
-const SENTENCE: [f32; 3] = [1.0, 2.0, 0.0];
+fn row() -> ObservationRows {
+    ObservationRows::new(1, vec![0.0, 0.0, 0.0, 1.0, 0.0])
+}
 
 /// What a network says: hidden of the core, logit of the end, of each program, of each scoping label, of the slot.
 #[derive(Debug)]
@@ -52,13 +55,14 @@ impl NetworkUse for Saying {
 
     fn run<N: Network>(self, network: N) -> Said {
         let network = network.map(&mut Tenths);
-        let percepts = network.perceive(&Pictures::default());
+        let percepts = network.perceive(&Pictures::default()).unwrap();
         let windows = match self.0 {
-            SpecificationForm::Instructions => Windows::of_instructions(1, &[&SENTENCE]),
-            SpecificationForm::Trajectories | SpecificationForm::Video => Windows::new(1, &[&ROW]),
+            SpecificationForm::Instructions => SpecificationRows::Sentences(vec![SENTENCE]),
+            SpecificationForm::Trajectories | SpecificationForm::Video => SpecificationRows::Observations(row()),
         };
-        let demonstration = network.demonstration(&windows, &percepts);
-        let reading = network.read(&demonstration, &ROW, &percepts, &[Given::default()]);
+        let demonstration = network.demonstration(&Windows::new(1, &[&windows]).unwrap(), &percepts).unwrap();
+        let state = States::Observations(row());
+        let reading = network.read(&demonstration, &state, &percepts, &[CalledWith::default()]).unwrap();
         let (core, _) = network.core(&reading, Program::Pick, &[1], None);
         Said {
             hidden: alike(core.hidden.clone()),
@@ -83,7 +87,7 @@ fn say(variant: Variant, form: SpecificationForm) -> Said {
         }
         other => panic!("{other:?} sees"),
     };
-    with_network(&config, Seed(1), &Device::flex(), Saying(form))
+    with_network(&config, Seed(1), &Device::flex(), Saying(form)).unwrap()
 }
 
 /// `expected`: hidden, label, slot. Key and end are 0.1 hidden + 0.1; a program's logit is its key's product with 0.1.
@@ -119,8 +123,8 @@ fn check(variants: &[Variant], expected: (f32, Option<f32>, f32)) {
 /// ```
 #[test]
 fn reactive_object_centric_networks_compute_what_they_say() {
-    check(&[Variant::Ntp], (0.256_087, Some(0.123_691_7), 0.116_669_6));
-    check(&[Variant::NtpNoScope, Variant::Flat], (0.256_087, None, 0.116_669_6));
+    check(&[Variant::NTP], (0.256_087, Some(0.123_691_7), 0.116_669_6));
+    check(&[Variant::NTP_NO_SCOPE, Variant::FLAT], (0.256_087, None, 0.116_669_6));
 }
 
 /// The cell reads x = 0.256087 and remembers nothing: all gates 0.1256087, beside 0.1 of what it remembers;
@@ -129,8 +133,8 @@ fn reactive_object_centric_networks_compute_what_they_say() {
 /// 0.1 * (0.0310870 + 0.1 * (0.1 + h) + 0.1) + 0.1 = 0.1149043.
 #[test]
 fn recurrent_object_centric_networks_compute_what_they_say() {
-    check(&[Variant::NtpGru], (0.079_565_1, Some(0.112_987_3), 0.114_904_3));
-    check(&[Variant::FlatGru], (0.079_565_1, None, 0.114_904_3));
+    check(&[Variant::NTP_GRU], (0.079_565_1, Some(0.112_987_3), 0.114_904_3));
+    check(&[Variant::FLAT_GRU], (0.079_565_1, None, 0.114_904_3));
 }
 
 /// ```text
@@ -142,8 +146,8 @@ fn recurrent_object_centric_networks_compute_what_they_say() {
 /// ```
 #[test]
 fn reactive_flattened_networks_compute_what_they_say() {
-    check(&[Variant::NtpPaper], (0.113_915, Some(0.113_65), 0.113_915));
-    check(&[Variant::NtpNoScopePaper, Variant::FlatPaper], (0.113_915, None, 0.113_915));
+    check(&[Variant::NTP_PAPER], (0.113_915, Some(0.113_65), 0.113_915));
+    check(&[Variant::NTP_NO_SCOPE_PAPER, Variant::FLAT_PAPER], (0.113_915, None, 0.113_915));
 }
 
 /// As the object-centric cell with x = 0.113915: gates 0.1113915, z = r = sigmoid(0.2113915) = 0.552652,
@@ -151,8 +155,8 @@ fn reactive_flattened_networks_compute_what_they_say() {
 /// Label 0.1 * (0.0115 + 0.1 * (0.1 + h) + 0.1) + 0.1 = 0.1128887, slot 0.1 * (0.1 * (0.1415 + 0.1 + h) + 0.1) + 0.1.
 #[test]
 fn recurrent_flattened_networks_compute_what_they_say() {
-    check(&[Variant::NtpGruPaper], (0.073_870_9, Some(0.112_888_7), 0.113_153_7));
-    check(&[Variant::FlatGruPaper], (0.073_870_9, None, 0.113_153_7));
+    check(&[Variant::NTP_GRU_PAPER], (0.073_870_9, Some(0.112_888_7), 0.113_153_7));
+    check(&[Variant::FLAT_GRU_PAPER], (0.073_870_9, None, 0.113_153_7));
 }
 
 /// ```text
@@ -164,8 +168,8 @@ fn recurrent_flattened_networks_compute_what_they_say() {
 /// ```
 #[test]
 fn the_ancestors_networks_compute_what_they_say() {
-    check(&[Variant::Npi], (0.063_735_9, None, 0.113_177_4));
-    check(&[Variant::NpiPaper], (0.063_722_1, None, 0.113_137_2));
+    check(&[Variant::NPI], (0.063_735_9, None, 0.113_177_4));
+    check(&[Variant::NPI_PAPER], (0.063_722_1, None, 0.113_137_2));
 }
 
 /// ```text
@@ -176,5 +180,5 @@ fn the_ancestors_networks_compute_what_they_say() {
 /// ```
 #[test]
 fn the_network_of_instructions_computes_what_it_says() {
-    check_in(SpecificationForm::Instructions, &[Variant::Ntp], (0.253_7, Some(0.123_67), 2.4));
+    check_in(SpecificationForm::Instructions, &[Variant::NTP], (0.253_7, Some(0.123_67), 2.4));
 }

@@ -232,6 +232,24 @@ fn fuzz_pipeline_files() {
 }
 
 #[test]
+fn fuzz_models() {
+    let folder = tempfile::tempdir().unwrap();
+    crate::damaged_model::small_model(folder.path(), ntp::model::Variant::NTP);
+    let files = [ntp::model::CONFIG_FILE, ntp::model::WEIGHTS_FILE].map(|file| {
+        let path = folder.path().join(file);
+        (path.clone(), std::fs::read(path).unwrap())
+    });
+    run(100, &(0..files.len(), changes_of_text()), |(file, changes)| {
+        let (path, whole) = &files[file];
+        std::fs::write(path, changed(whole, &changes)).unwrap();
+        let described = ntp::model::inspect(folder.path());
+        let acts = ntp::rollout::load_policy(folder.path(), ntp::model::Decoder::Mss);
+        assert_eq!(described.is_ok(), acts.is_ok(), "what can be described can act");
+        std::fs::write(path, whole).unwrap();
+    });
+}
+
+#[test]
 fn fuzz_checksum_files() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.txt"), "a").unwrap();

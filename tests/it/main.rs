@@ -9,6 +9,8 @@ mod cli;
 #[cfg(all(test, feature = "cloud"))]
 mod cloud;
 #[cfg(test)]
+mod damaged_model;
+#[cfg(test)]
 mod dataset;
 #[cfg(test)]
 mod dataset_edit;
@@ -86,6 +88,8 @@ mod trace;
 mod training;
 #[cfg(test)]
 mod tutorial;
+#[cfg(test)]
+mod variant;
 #[cfg(test)]
 mod video;
 #[cfg(test)]

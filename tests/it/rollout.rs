@@ -1,9 +1,9 @@
 //! The interpreter, driven by the oracle.
 
-use ntp::model::Decisions;
+use ntp::model::ScopingKind;
 use ntp::program::Program;
 use ntp::robot::{Action, RobotApi};
-use ntp::rollout::{Decision, Limits, Oracle, Policy, Query, RolloutEpisode, Start, run};
+use ntp::rollout::{Decision, Limits, Oracle, Policy, PolicyError, Query, RolloutEpisode, Start, run};
 use ntp::scene::{BodyIndex, Scene, SceneState, SlotIndex};
 use ntp::task::{Split, Task};
 use ntp::trace::{Actor, Cause, Frame, Outcome, Provenance};
@@ -103,14 +103,14 @@ impl<P: Policy> Policy for Spoiled<P> {
         "spoiled"
     }
 
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
-        let mut decisions = self.inner.decide(queries);
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
+        let mut decisions = self.inner.decide(queries)?;
         for (query, decision) in queries.iter().zip(&mut decisions) {
             if query.decision == self.at {
                 (self.spoil)(query, decision);
             }
         }
-        decisions
+        Ok(decisions)
     }
 }
 
@@ -138,20 +138,36 @@ fn an_early_end_of_the_root_is_a_failure_although_nothing_went_wrong_before() {
 }
 
 #[test]
+fn a_policy_that_leaves_a_query_unanswered_ends_the_rollout_with_an_error() {
+    struct Silent;
+    impl Policy for Silent {
+        fn name(&self) -> &str {
+            "silent"
+        }
+        fn decide(&mut self, _queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
+            Ok(Vec::new())
+        }
+    }
+    let task = tower("t", &[4, 1], Split::Unseen);
+    let error = run(&mut Silent, vec![start(&task, 1, 1)], Limits::default()).unwrap_err().to_string();
+    assert_eq!(error, "policy silent made 0 decisions; asked for were 1");
+}
+
+#[test]
 fn a_policy_that_never_ends_is_stopped() {
     struct Endless;
     impl Policy for Endless {
         fn name(&self) -> &str {
             "endless"
         }
-        fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+        fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
             let go_on = |query: &Query| Decision {
                 program: ntp::program::Program::MoveTo,
                 argument: Some(SlotIndex(0)),
                 end_of_program: false,
                 ..Decision::end(query)
             };
-            queries.iter().map(go_on).collect()
+            Ok(queries.iter().map(go_on).collect())
         }
     }
     let task = tower("t", &[4, 1], Split::Unseen);
@@ -167,16 +183,16 @@ impl Policy for FlatOracle {
         "flat"
     }
 
-    fn decides(&self) -> Decisions {
-        Decisions::Primitives
+    fn scoping(&self) -> ScopingKind {
+        ScopingKind::Primitives
     }
 
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
         let decision = |query: &Query| {
             let planned = self.0.get(query.decision as usize).cloned();
             planned.map_or_else(|| Decision::end(query), |decision| Decision { scope: query.window, ..decision })
         };
-        queries.iter().map(decision).collect()
+        Ok(queries.iter().map(decision).collect())
     }
 }
 
@@ -207,10 +223,10 @@ impl Policy for Stubborn {
     fn name(&self) -> &str {
         "stubborn"
     }
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
         let Self(program, argument) = *self;
         let decision = |query: &Query| Decision { program, argument, end_of_program: false, ..Decision::end(query) };
-        queries.iter().map(decision).collect()
+        Ok(queries.iter().map(decision).collect())
     }
 }
 

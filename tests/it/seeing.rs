@@ -13,7 +13,7 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, GripperState, Provenance, SpecificationForm};
-use ntp::training::{Hooks, TrainConfig, Training, train, train_seeing};
+use ntp::training::{Hooks, TrainConfig, Training, train, train_on_pictures};
 
 use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
 use crate::painter::{Painter, Paintings};
@@ -28,14 +28,14 @@ fn shown(tasks: &[Task], n_trials: u32) -> (DatasetTrials, Paintings) {
 
 fn training(steps: u32) -> Training {
     let config = TrainConfig { steps: Some(steps), warmup_steps: 20, ..TrainConfig::default() };
-    Training { variant: Variant::NtpVidE2e, specification: SpecificationForm::Video, seed: 0, config }
+    Training { variant: Variant::NTP_VID_E2E, specification: SpecificationForm::Video, seed: 0, config }
 }
 
 fn learn(training: &Training, (data, paintings): &(DatasetTrials, Paintings), folder: &Path) -> f32 {
     let mut loss = f32::NAN;
     let mut on_progress = |progress: ntp::training::Progress| loss = progress.loss;
     let hooks = &mut Hooks { on_progress: &mut on_progress, should_stop: &|| false };
-    train_seeing(training, data, Some(paintings), folder, hooks).unwrap();
+    train_on_pictures(training, data, Some(paintings), folder, hooks).unwrap();
     loss
 }
 
@@ -55,10 +55,10 @@ fn colour_slots_find_each_block_and_the_robot_first() {
     }
     let config = ColourSlotsConfig { pixels: 64, colours: 9 };
     let mut slots = ColourSlots::fresh(&config, Seed(1), &Device::flex());
-    slots = slots.acquainted(&sample, Seed(2));
+    slots = slots.calibrated(&sample, Seed(2)).unwrap();
     let mut first = Painter::nothing();
     paintings.show(0, &[0], &mut first);
-    let found = values(slots.look(&first).0);
+    let found = values(slots.look(&first).unwrap().0);
     let episode = &paintings.0[0];
     let seen: Vec<[f32; 2]> = found.as_chunks::<4>().0.iter().map(|percept| [percept[0], percept[1]]).collect();
     for body in episode.scene.body_indices() {
@@ -80,7 +80,7 @@ fn the_paper_s_picture_network_has_seven_layers_and_a_vector_of_128() {
     let mut painted = Painter::nothing();
     let (_, paintings) = shown(&[tower("a", &[0, 1], Split::Seen)], 1);
     paintings.show(0, &[0, 1, 0], &mut painted);
-    let features = values(network.perceive(&painted));
+    let features = values(network.perceive(&painted).unwrap());
     assert_eq!(features.len(), 3 * 128);
     assert_eq!(features[..128], features[256..]);
     assert_ne!(features[..128], features[128..256]);
@@ -102,7 +102,7 @@ fn keypoints_have_a_score_for_each_slot_in_each_cell_and_the_robot_first() {
     let keypoints = Keypoints::fresh(&config, Seed(1), &Device::flex());
     let layers = [25 * 4 * 16 + 16, 9 * 16 * 32 + 32, 9 * 32 * 32 + 32, 32 * 5 + 5];
     assert_eq!(keypoints.num_params(), layers.iter().sum::<usize>());
-    let (percepts, looks) = keypoints.look(&noise(0));
+    let (percepts, looks) = keypoints.look(&noise(0)).unwrap();
     assert_eq!((percepts.dims(), looks.scores().dims()), ([1, 5, 4], [1, 256, 4]));
     for percept in values(percepts).as_chunks::<4>().0 {
         assert!(percept[..2].iter().all(|place| (-1.0..=1.0).contains(place)), "{percept:?}");
@@ -113,7 +113,7 @@ fn keypoints_have_a_score_for_each_slot_in_each_cell_and_the_robot_first() {
 #[test]
 fn a_picture_moved_by_a_cell_has_its_scores_a_cell_further() {
     let keypoints = Keypoints::fresh(&KeypointsConfig::of(64, 4), Seed(1), &Device::flex());
-    let [still, moved] = [0, 4].map(|shift| values(keypoints.look(&noise(shift)).1.scores()));
+    let [still, moved] = [0, 4].map(|shift| values(keypoints.look(&noise(shift)).unwrap().1.scores()));
     let score = |scores: &[f32], row: usize, column: usize| scores[(row * 16 + column) * 4];
     // Away from the border, where zeros are seen.
     for (row, column) in (4..12).flat_map(|row| (4..12).map(move |column| (row, column))) {
@@ -134,7 +134,7 @@ fn a_variant_that_sees_is_refused_without_pictures() {
 #[test]
 fn the_same_pictures_give_the_same_weights_for_any_number_of_threads() {
     let shown = shown(&[tower("a", &[0, 1, 2], Split::Seen), tower("b", &[5, 3], Split::Seen)], 3);
-    for variant in [Variant::NtpVidE2e, Variant::NtpVidE2ePaper, Variant::NtpVidE2eGeneral] {
+    for variant in [Variant::NTP_VID_E2E, Variant::NTP_VID_E2E_PAPER, Variant::NTP_VID_E2E_GENERAL] {
         let weights = |threads| {
             let folder = tempfile::tempdir().unwrap();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use ntp::dataset::{DatasetTrials, TrialData};
-use ntp::model::{CONFIG_FILE, Decisions, Decoder, ModelConfig, Variant, WEIGHTS_FILE};
+use ntp::model::{CONFIG_FILE, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE};
 use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
@@ -47,7 +47,7 @@ fn towers() -> DatasetTrials {
 }
 
 fn ntp(config: TrainConfig) -> Training {
-    Training { variant: Variant::Ntp, specification: SpecificationForm::default(), seed: 0, config }
+    Training { variant: Variant::NTP, specification: SpecificationForm::default(), seed: 0, config }
 }
 
 fn resolved(config: TrainConfig) -> TrainConfig {
@@ -95,7 +95,7 @@ fn labels_of_stacking_are_the_demonstrations_spans() {
 #[test]
 fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
     let data = towers();
-    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Primitives, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), ScopingKind::Primitives, Grain::Call).unwrap();
     assert_eq!(examples.levels().collect::<Vec<_>>(), [(Program::BlockStacking, true)]);
     let mut rng = Seed(1).rng();
     let mut run = examples.draw(0, Pairing::Cross, &mut rng);
@@ -123,7 +123,7 @@ fn a_flat_model_learns_the_primitives_from_the_whole_demonstration() {
 #[test]
 fn without_scopes_every_program_learns_from_the_whole_demonstration() {
     let data = towers();
-    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Unscoped, Grain::Decision).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), ScopingKind::Unscoped, Grain::Decision).unwrap();
     assert_eq!(examples.levels().count(), 4);
     let mut rng = Seed(1).rng();
     for level in 0..4 {
@@ -137,7 +137,7 @@ fn without_scopes_every_program_learns_from_the_whole_demonstration() {
 #[test]
 fn npi_learns_what_programs_are_called_with() {
     let data = towers();
-    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Arguments, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), ScopingKind::Arguments, Grain::Call).unwrap();
     assert_eq!(examples.task_ids(), ["a", "b"]);
     let of = |program: Program| -> Example {
         let trial = data.trials.iter().position(|trial| trial.task_id == "b").unwrap();
@@ -145,23 +145,23 @@ fn npi_learns_what_programs_are_called_with() {
     };
     let slots = |slots: [u16; 2]| slots.map(SlotIndex);
     let root = of(Program::BlockStacking);
-    assert_eq!((root.given.task, root.given.arguments), (Some(1), [None, None]));
+    assert_eq!((root.called_with.task, root.called_with.arguments), (Some(1), [None, None]));
     assert_eq!(root.arguments, slots([3, 5]));
     let below = of(Program::PickAndPlace);
-    assert_eq!((below.given.task, below.given.arguments), (None, slots([3, 5]).map(Some)));
+    assert_eq!((below.called_with.task, below.called_with.arguments), (None, slots([3, 5]).map(Some)));
     assert_eq!((below.callee, below.arguments.as_slice()), (Program::Pick, &slots([3, 5])[..1]));
     let lowest = of(Program::Place);
-    assert_eq!(lowest.given.arguments, [Some(SlotIndex(5)), None]);
+    assert_eq!(lowest.called_with.arguments, [Some(SlotIndex(5)), None]);
     assert_eq!((lowest.callee, lowest.arguments.as_slice()), (Program::MoveTo, &slots([5, 3])[..1]));
 }
 
 #[test]
 fn the_steps_of_a_call_are_packed_step_by_step() {
     let data = towers();
-    let examples = Examples::of(&data, SpecificationForm::default(), Decisions::Scoped, Grain::Call).unwrap();
+    let examples = Examples::of(&data, SpecificationForm::default(), ScopingKind::Scoped, Grain::Call).unwrap();
     let config = resolved(TrainConfig { relabel_slots: Some(1.0), ..TrainConfig::default() });
     for level in 0..4 {
-        for part in draw(&examples, &config, level, 24, Seed(2)) {
+        for part in draw(&examples, &config, level, 24, Seed(2)).unwrap() {
             assert_eq!(part.steps.iter().sum::<usize>(), part.ends.len());
             assert!(part.steps.is_sorted_by(|a, b| a >= b), "{:?}", part.steps);
             // The last of a call's steps ends its program, and no other does.
@@ -225,7 +225,7 @@ fn a_mini_batchs_targets_sum_to_one_over_its_parts() {
     let examples = Examples::new(&data).unwrap();
     let config = resolved(TrainConfig::default());
     for level in 0..examples.levels().count() {
-        let parts = draw(&examples, &config, level, 48, Seed(4));
+        let parts = draw(&examples, &config, level, 48, Seed(4)).unwrap();
         let sum = |values: &dyn Fn(&ntp::training::Part) -> f32| parts.iter().map(values).sum::<f32>();
         assert!((sum(&|part| part.programs.iter().sum()) - 1.0).abs() < 1e-4);
         let scopes = sum(&|part| part.scopes.iter().flatten().sum());
@@ -243,8 +243,9 @@ fn a_gripper_is_jittered_only_where_the_decision_stays_right() {
     let always = resolved(TrainConfig { gripper_jitter: Some(1.0), ..TrainConfig::default() });
     let never = TrainConfig { gripper_jitter: Some(0.0), ..always.clone() };
     let states = |config: &TrainConfig, level: usize| -> Vec<Vec<f32>> {
-        let parts = draw(&examples, config, level, 32, Seed(4));
-        parts.iter().flat_map(|part| part.states.chunks(26).map(<[f32]>::to_vec)).collect()
+        let parts = draw(&examples, config, level, 32, Seed(4)).unwrap();
+        let rows = |part: &ntp::training::Part| part.states.observations().unwrap().values().to_vec();
+        parts.iter().flat_map(|part| rows(part).chunks(26).map(<[f32]>::to_vec).collect::<Vec<_>>()).collect()
     };
     let place = examples.levels().position(|(program, _)| program == Program::Place).unwrap();
     assert_eq!(states(&always, place), states(&never, place), "a gripper that holds something stays");
@@ -271,6 +272,29 @@ fn weights(training: &Training, data: &DatasetTrials) -> Vec<u8> {
     std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
 }
 
+#[test]
+fn a_loss_that_is_no_number_ends_the_training_with_step_and_level_and_keeps_the_checkpoint_before() {
+    let data = towers();
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        steps: Some(40),
+        batch: 8,
+        learning_rate: Some(1e37),
+        warmup_steps: 0,
+        clip_norm: 1e30,
+        checkpoint_every: 1,
+        ..TrainConfig::default()
+    };
+    let error = train_until(&ntp(config), &data, folder.path(), None).unwrap_err();
+    let TrainError::NotFinite { step, level, found } = error else { panic!("{error}") };
+    assert!(step > 1 && !found.is_finite(), "step {step}: {found}");
+    assert!(Program::ALL.iter().any(|program| program.name() == level), "{level}");
+    let said = TrainError::NotFinite { step, level, found }.to_string();
+    assert!(said.starts_with(&format!("the loss of {level} is {found} in step {step}; allowed: finite")), "{said}");
+    assert!(!folder.path().join(CONFIG_FILE).exists() && !folder.path().join(WEIGHTS_FILE).exists());
+    assert!(folder.path().join(format!("checkpoint/step-{:08}.safetensors", step - 1)).exists());
+}
+
 fn short() -> TrainConfig {
     TrainConfig { steps: Some(6), batch: 48, warmup_steps: 2, metrics_every: 1, ..TrainConfig::default() }
 }
@@ -278,7 +302,7 @@ fn short() -> TrainConfig {
 #[test]
 fn the_same_seed_gives_the_same_weights_for_any_number_of_threads() {
     let data = towers();
-    for variant in Variant::ALL.into_iter().filter(|variant| !variant.sees()) {
+    for variant in Variant::named().filter(|variant| !variant.sees()) {
         let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         let training = Training { variant, ..ntp(short()) };
         let on = |n| pool(n).install(|| weights(&training, &data));
@@ -330,7 +354,7 @@ fn a_models_folder_tells_how_it_was_made() {
     let folder = tempfile::tempdir().unwrap();
     let summary = train_until(&ntp(short()), &data, folder.path(), None).unwrap();
     let config: ModelConfig = ntp::artifact::read_json(&folder.path().join(CONFIG_FILE)).unwrap();
-    assert_eq!((config.variant, config.family, config.n_slots), (Variant::Ntp, Family::BlockStacking, 8));
+    assert_eq!((config.variant, config.family, config.n_slots), (Variant::NTP, Family::BlockStacking, 8));
     let training: Training = serde_json::from_value(config.training).unwrap();
     assert_eq!(training, ntp(short()).resolved());
     let mut table = ntp::table::read(&folder.path().join(METRICS_FILE), &METRICS).unwrap();
@@ -406,11 +430,11 @@ fn instructions_are_for_variant_ntp_without_other_names_for_slots() {
         let training = Training { variant, specification: SpecificationForm::Instructions, seed: 0, config };
         training.check().unwrap_err().to_string()
     };
-    let error = refused(Variant::Flat, TrainConfig::default());
+    let error = refused(Variant::FLAT, TrainConfig::default());
     assert_eq!(error, "specification is instructions with variant flat; allowed: instructions with variant ntp alone");
     let relabelled = TrainConfig { relabel_slots: Some(0.5), ..TrainConfig::default() };
     assert_eq!(
-        refused(Variant::Ntp, relabelled),
+        refused(Variant::NTP, relabelled),
         "relabel_slots is 0.5; allowed: 0 with instructions, whose words name slots"
     );
 }
@@ -419,17 +443,13 @@ fn instructions_are_for_variant_ntp_without_other_names_for_slots() {
 fn an_example_of_instructions_has_the_sentences_of_its_sub_task() {
     let data = towers();
     let form = SpecificationForm::Instructions;
-    let examples = Examples::of(&data, form, Decisions::Scoped, Grain::Decision).unwrap();
+    let examples = Examples::of(&data, form, ScopingKind::Scoped, Grain::Decision).unwrap();
     let call = decisions(&data, 0, Program::BlockStacking)[1];
     let example = examples.example(0, call, 1).unwrap();
     assert_eq!((example.window, example.scope), (span(0, 4), Some(span(2, 4))));
     let vocabulary = Vocabulary::new(["A", "B", "C", "D", "E", "F", "G", "H"]);
-    let said: Vec<f32> = ["pick C", "place on B"]
-        .into_iter()
-        .flat_map(|sentence| vocabulary.words(sentence).unwrap())
-        .map(f32::from)
-        .collect();
-    assert_eq!(examples.specification_rows(1, span(2, 4)), said);
+    let said = ["pick C", "place on B"].map(|sentence| vocabulary.words(sentence).unwrap());
+    assert_eq!(examples.specification_rows(1, span(2, 4)), SpecificationRows::Sentences(said.to_vec()));
 }
 
 #[test]

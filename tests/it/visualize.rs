@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use ntp::model::Decisions;
+use ntp::model::ScopingKind;
 use ntp::program::Program;
-use ntp::rollout::{Decision, Divergence, DivergenceKind, Expectation, Limits, Oracle, Policy, Query, Start, run};
+use ntp::rollout::{
+    Decision, Divergence, DivergenceKind, Expectation, Limits, Oracle, Policy, PolicyError, Query, Start, run,
+};
 use ntp::scene::BodyIndex;
 use ntp::task::{Split, Task};
 use ntp::trace::{Actor, Cause, Episode, Frame, Outcome, Prediction, ProgramCall, Provenance, Push, Span};
@@ -24,12 +26,12 @@ impl Policy for Sure {
         "ntp"
     }
 
-    fn decide(&mut self, queries: &[Query]) -> Vec<Decision> {
-        let mut decisions = self.0.decide(queries);
+    fn decide(&mut self, queries: &[Query]) -> Result<Vec<Decision>, PolicyError> {
+        let mut decisions = self.0.decide(queries)?;
         for (query, decision) in queries.iter().zip(&mut decisions) {
             decision.prediction = Some(prediction(query, decision));
         }
-        decisions
+        Ok(decisions)
     }
 }
 
@@ -59,7 +61,7 @@ fn rollout(task: &Task) -> (Episode, Episode) {
         sight: None,
         provenance: Provenance::new(task, &own_trial, Actor::Policy(String::new()), 42),
     };
-    let expected = Expectation::new(Decisions::Scoped, &start.demonstration, start.world.scene());
+    let expected = Expectation::new(ScopingKind::Scoped, &start.demonstration, start.world.scene());
     let mut policy = Sure(Oracle::new(vec![expected]));
     let episode = run(&mut policy, vec![start], Limits::default()).unwrap().remove(0).episode;
     (shown, smooth(episode))

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use crate::model::detector::AXES;
+
 /// What a position is told from: place and mass of a colour and of the robot, and a constant.
 const N_FEATURES: usize = 7;
 /// Directions of features that vary less than this, of the most that any does, tell nothing.
@@ -10,19 +12,19 @@ const LEAST_VARIANCE: f64 = 1e-7;
 /// colour tells its place, so it takes one of those that are left.
 const STILL: f64 = 1e-6;
 
-/// Looks at pictures (`[F, K, width]`: x, y and mass first) beside positions (`[F, row]`: three a slot), and chooses for
+/// Looks at pictures (`[F, K, width]`: x, y and mass first) beside positions (`[F * N]`), and chooses for
 /// each of `n_slots` slots one of the colours behind the first, which is the robot's; each colour is chosen once at most.
 /// There must be as many.
 pub(super) fn colours_of_slots(
     looks: &[f32],
     [n_colours, width]: [usize; 2],
-    rows: &[f32],
+    positions: &[[f32; AXES]],
     n_slots: usize,
 ) -> Vec<usize> {
     let n_pictures = looks.len() / (n_colours * width).max(1);
-    let row_width = rows.len() / n_pictures.max(1);
-    let positions =
-        DMatrix::from_fn(n_pictures, 3 * n_slots, |picture, column| f64::from(rows[picture * row_width + column]));
+    let positions = DMatrix::from_fn(n_pictures, AXES * n_slots, |picture, column| {
+        f64::from(positions[picture * n_slots + column / AXES][column % AXES])
+    });
     let variations = errors(&DMatrix::from_element(n_pictures, 1, 1.0), &positions);
     let mut residuals: Vec<(f64, usize, usize)> = Vec::new();
     for colour in 1..n_colours {
@@ -45,7 +47,7 @@ pub(super) fn colours_of_slots(
 }
 
 fn sum_of_slot(columns: &[f64], slot: usize) -> f64 {
-    columns[3 * slot..3 * slot + 3].iter().sum()
+    columns.as_chunks::<AXES>().0[slot].iter().sum()
 }
 
 /// The squared errors that are left of each column after linear regression on the features.
@@ -86,11 +88,11 @@ mod tests {
             let places: Vec<[f32; 2]> = (0..4).map(|of| [wave(picture, of), wave(picture, of + 10)]).collect();
             looks.extend(places.iter().flat_map(|&[x, y]| [x, y, 0.5]));
             // The first slot stands aside.
-            rows.extend([0.5, 0.25, 0.125]);
+            rows.push([0.5, 0.25, 0.125]);
             // The second is the third colour, the third the first; both are told from the robot.
             for colour in [3, 1] {
                 let [x, y] = [0, 1].map(|axis| places[colour][axis] - places[0][axis]);
-                rows.extend([0.3 * x, -0.2 * y, 0.1 * y]);
+                rows.push([0.3 * x, -0.2 * y, 0.1 * y]);
             }
         }
         assert_eq!(colours_of_slots(&looks, [4, 3], &rows, 3), [2, 3, 1]);

@@ -21,13 +21,18 @@ use burn::tensor::{Device, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::{ColourSlots, ColourSlotsConfig, FIND_WIDTH, Find, Finder};
-use crate::model::detector::Detector;
 use crate::model::detector::assignment::colours_of_slots;
 use crate::model::detector::patches::{CHANNELS, Claimed};
+use crate::model::detector::{AXES, Detector, DetectorDefaults};
+use crate::model::encoder::TrainingDefaults;
 use crate::model::layers::{Init, Mlp};
+use crate::model::limits::{ConfigError, check_sizes};
 use crate::model::linear::Linear;
+use crate::model::object_centric::ObjectCentric;
 use crate::model::perception::Perception as _;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
+use crate::model::values::values;
 use crate::seed::Seed;
 
 /// What a find tells by itself: its numbers and three products of its place.
@@ -57,6 +62,16 @@ impl PointDetectorConfig {
     /// The default widths with colour slots.
     pub fn of(perception: ColourSlotsConfig) -> Self {
         Self { perception, width: 64, pair_width: 16, patch: perception.pixels / 4 }
+    }
+
+    /// Whether a detector of `n_slots` slots can have these sizes.
+    pub(crate) fn check(&self, n_slots: usize) -> Result<(), ConfigError> {
+        let &Self { perception, width, pair_width, patch } = self;
+        perception.check()?;
+        check_sizes(&[("width", width), ("pair_width", pair_width), ("patch", patch)])?;
+        let ColourSlotsConfig { pixels, colours } = perception;
+        ConfigError::unless(colours > n_slots, "colours", colours, "more colours than slots for a detector")?;
+        ConfigError::unless((2..=pixels).contains(&patch), "patch", patch, "2 pixels to the whole picture")
     }
 }
 
@@ -97,9 +112,18 @@ struct Looks {
 }
 
 impl PointDetector {
-    fn look(&self, pictures: &Pictures) -> Looks {
+    /// What is behind it learns on detections as it does on positions, in more steps.
+    pub(crate) const TRAINING: DetectorDefaults = DetectorDefaults {
+        steps: 3000,
+        pictures: 192,
+        learning_rate: 0.002,
+        narrowed: None,
+        behind: TrainingDefaults { steps: 2000, ..ObjectCentric::TRAINING },
+    };
+
+    fn look(&self, pictures: &Pictures) -> Result<Looks, ReadError> {
         let device = self.place.device();
-        let claims = self.perception.claims(pictures);
+        let claims = self.perception.claims(pictures)?;
         let claimed = Claimed { pictures, claims: &claims, n_things: self.n_slots };
         let mut finder = Finder::new(pictures.width, pictures.height);
         let n_percepts = self.n_slots + 1;
@@ -121,7 +145,7 @@ impl PointDetector {
             patches.push(Tensor::<3>::from_data(patch, &device));
         }
         let looks = TensorData::new(looks, [pictures.n, n_percepts, LOOK_WIDTH]);
-        Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1) }
+        Ok(Looks { looks: Tensor::from_data(looks, &device), patches: Tensor::cat(patches, 1) })
     }
 
     /// The most that the other slots and the robot tell of each thing by where they lie to it: `[F, N, pair]`.
@@ -161,24 +185,23 @@ impl Detector for PointDetector {
             thing: init.linear(n_told, width),
             slots: init.filled([n_slots, width], 0.0),
             hidden: init.mlp(&[width, width]),
-            position: init.linear(width, 3),
-            place: init.linear(LOOK_WIDTH, 3),
-            slot_positions: init.filled([n_slots, 3], 0.0),
+            position: init.linear(width, AXES),
+            place: init.linear(LOOK_WIDTH, AXES),
+            slot_positions: init.filled([n_slots, AXES], 0.0),
         }
     }
 
-    fn acquainted(mut self, sample: &PictureSample, positions: &[f32], seed: Seed) -> Self {
-        self.perception = self.perception.acquainted(sample, seed);
-        let (looks, ()) = self.perception.look(&sample.pictures);
+    fn calibrated(mut self, sample: &PictureSample, positions: &[[f32; 3]], seed: Seed) -> Result<Self, ReadError> {
+        self.perception = self.perception.calibrated(sample, seed)?;
+        let (looks, ()) = self.perception.look(&sample.pictures)?;
         let [_, n_colours, width] = looks.dims();
-        let looks: Vec<f32> = looks.into_data().try_into_vec().unwrap_or_default();
-        let colours = colours_of_slots(&looks, [n_colours, width], positions, self.n_slots);
-        self.perception = self.perception.with_first(&colours);
-        self
+        let colours = colours_of_slots(&values(looks)?, [n_colours, width], positions, self.n_slots);
+        self.perception = self.perception.with_first(&colours)?;
+        Ok(self)
     }
 
-    fn detect(&self, pictures: &Pictures) -> Tensor<2> {
-        self.things(&self.look(pictures)).flatten::<2>(1, 2)
+    fn detect(&self, pictures: &Pictures) -> Result<Tensor<2>, ReadError> {
+        Ok(self.things(&self.look(pictures)?).flatten::<2>(1, 2))
     }
 
     fn device(&self) -> Device {

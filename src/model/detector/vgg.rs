@@ -12,10 +12,13 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::model::convolution::Convolution;
-use crate::model::detector::Detector;
+use crate::model::detector::{AXES, Detector, DetectorDefaults};
+use crate::model::encoder::TrainingDefaults;
 use crate::model::layers::{Init, Mlp, replaced};
+use crate::model::limits::{ConfigError, check_sizes};
 use crate::model::linear::Linear;
 use crate::model::pictures::{PictureSample, Pictures};
+use crate::model::read_error::ReadError;
 use crate::seed::Seed;
 
 /// Channels of each block's convolutions at full width, and how many there are.
@@ -43,6 +46,15 @@ impl VggDetectorConfig {
     pub const MOST_NARROWED: usize = 64;
     /// Five times halved, a picture must still have a pixel.
     pub const LEAST_PIXELS: usize = 32;
+
+    /// Whether a network can have these sizes.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let &Self { pixels, narrowed } = self;
+        check_sizes(&[("pixels", pixels)])?;
+        let (is_seen, is_wide) = (pixels >= Self::LEAST_PIXELS, (1..=Self::MOST_NARROWED).contains(&narrowed));
+        ConfigError::unless(is_seen, "pixels", pixels, "32 and more, which are halved five times")?;
+        ConfigError::unless(is_wide, "narrowed", narrowed, "1 (full width) to 64")
+    }
 }
 
 /// VGG16's layers.
@@ -56,6 +68,17 @@ pub struct VggDetector {
     blocks: Vec<Vec<Convolution>>,
     top: Mlp,
     positions: Linear,
+}
+
+impl VggDetector {
+    /// What is behind it learns slower than on positions, and without their augmentations.
+    pub(crate) const TRAINING: DetectorDefaults = DetectorDefaults {
+        steps: 3000,
+        pictures: 32,
+        learning_rate: 0.0005,
+        narrowed: Some(VggDetectorConfig::NARROWED as u32),
+        behind: TrainingDefaults::plain(3000, 0.001),
+    };
 }
 
 impl Detector for VggDetector {
@@ -79,20 +102,20 @@ impl Detector for VggDetector {
             deviation: init.filled([1], 1.0).set_require_grad(false),
             blocks,
             top: init.mlp(&[channels * pixels * pixels, top, top]),
-            positions: init.linear(top, 3 * n_slots),
+            positions: init.linear(top, AXES * n_slots),
         }
     }
 
-    fn acquainted(mut self, sample: &PictureSample, _positions: &[f32], _seed: Seed) -> Self {
+    fn calibrated(mut self, sample: &PictureSample, _positions: &[[f32; 3]], _seed: Seed) -> Result<Self, ReadError> {
         let pixels = sample.pictures.to_tensor(&self.device());
         let mean = pixels.clone().mean_dim(0);
         let deviation = (pixels - mean.clone()).powf_scalar(2.0).mean().sqrt().clamp_min(LEAST_DEVIATION);
         self.mean = replaced(&self.mean, mean.squeeze_dim::<3>(0).into_data(), &self.device()).set_require_grad(false);
         self.deviation = replaced(&self.deviation, deviation.into_data(), &self.device()).set_require_grad(false);
-        self
+        Ok(self)
     }
 
-    fn detect(&self, pictures: &Pictures) -> Tensor<2> {
+    fn detect(&self, pictures: &Pictures) -> Result<Tensor<2>, ReadError> {
         let pixels = pictures.to_tensor(&self.device()) - self.mean.val().unsqueeze::<4>();
         let pixels = pixels / self.deviation.val().unsqueeze::<4>();
         let pool = MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init();
@@ -100,7 +123,7 @@ impl Detector for VggDetector {
             let seen = block.iter().fold(seen, |seen, layer| relu(layer.forward(seen)));
             pool.forward(seen.permute([0, 3, 1, 2])).permute([0, 2, 3, 1])
         });
-        self.positions.forward(self.top.forward(seen.flatten::<2>(1, 3)))
+        Ok(self.positions.forward(self.top.forward(seen.flatten::<2>(1, 3))))
     }
 
     fn device(&self) -> Device {

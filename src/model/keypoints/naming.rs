@@ -122,7 +122,7 @@ mod tests {
     use crate::model::keypoints::CellLooks;
 
     fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-        tensor.into_data().try_into_vec().unwrap_or_default()
+        crate::model::values(tensor).unwrap()
     }
 
     #[test]

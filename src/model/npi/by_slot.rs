@@ -4,13 +4,14 @@ use burn::module::Module;
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::model::decisions::MAX_ARGUMENTS;
-use crate::model::features::{OBJECT_WIDTH, POSITION_WIDTH, Rows};
+use crate::model::features::{self, OBJECT_WIDTH, POSITION_WIDTH};
 use crate::model::layers::Init;
 use crate::model::linear::Linear;
-use crate::model::network::Given;
+use crate::model::network::CalledWith;
 use crate::model::npi::{CallEncoder, flags};
 use crate::model::object_centric::ObjectCentricConfig;
+use crate::model::scoping_kind::MAX_ARGUMENTS;
+use crate::trace::ObservationRows;
 
 /// Each slot with its relations to the others and whether it is an argument. Slots are named through a layer with
 /// parameters for each of them: what a task does to which slot stands in the weights alone.
@@ -52,15 +53,14 @@ impl CallEncoder for BySlot {
         (config.width, config.program_width)
     }
 
-    fn read(&self, states: &[f32], given: &[Given]) -> SlotReading {
+    fn read(&self, states: &ObservationRows, called_with: &[CalledWith]) -> SlotReading {
         let device = self.device();
-        let (n_batch, n_slots) = (given.len(), self.n_slots());
-        let rows = Rows { n_slots, values: states };
-        let pairs = TensorData::new(rows.pairs(), [n_batch, n_slots, n_slots, POSITION_WIDTH]);
+        let (n_batch, n_slots) = (called_with.len(), self.n_slots());
+        let pairs = TensorData::new(features::pairs(states), [n_batch, n_slots, n_slots, POSITION_WIDTH]);
         let pairs = relu(self.pair.forward(Tensor::<4>::from_data(pairs, &device)));
         let relations = pairs.max_dim(2).squeeze_dim::<3>(2); // [B, N, pair]
-        let objects = TensorData::new(rows.objects(), [n_batch, n_slots, OBJECT_WIDTH]);
-        let flags = TensorData::new(flags(given, n_slots), [n_batch, n_slots, MAX_ARGUMENTS]);
+        let objects = TensorData::new(features::objects(states), [n_batch, n_slots, OBJECT_WIDTH]);
+        let flags = TensorData::new(flags(called_with, n_slots), [n_batch, n_slots, MAX_ARGUMENTS]);
         let features = vec![relations, Tensor::from_data(objects, &device), Tensor::from_data(flags, &device)];
         let objects = relu(self.hidden.forward(relu(self.object.forward(Tensor::cat(features, 2)))));
         SlotReading { state: objects.clone().max_dim(1).squeeze_dim(1), objects }

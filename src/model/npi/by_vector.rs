@@ -3,13 +3,14 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::model::decisions::MAX_ARGUMENTS;
-use crate::model::features::{Rows, flat_width};
-use crate::model::flattened::FlattenedConfig;
+use crate::model::features::{self, flat_width};
 use crate::model::layers::{Init, Mlp};
 use crate::model::linear::Linear;
-use crate::model::network::Given;
+use crate::model::network::CalledWith;
 use crate::model::npi::{CallEncoder, flags};
+use crate::model::scoping_kind::MAX_ARGUMENTS;
+use crate::model::vectors::FlattenedConfig;
+use crate::trace::ObservationRows;
 
 /// All slots side by side, and for each whether it is an argument.
 #[derive(Module, Debug)]
@@ -37,11 +38,11 @@ impl CallEncoder for ByVector {
         (config.width, config.program_width)
     }
 
-    fn read(&self, states: &[f32], given: &[Given]) -> Tensor<2> {
+    fn read(&self, states: &ObservationRows, called_with: &[CalledWith]) -> Tensor<2> {
         let device = self.device();
-        let (n_batch, n_slots) = (given.len(), self.n_slots());
-        let states = TensorData::new(Rows { n_slots, values: states }.flat(), [n_batch, flat_width(n_slots)]);
-        let flags = TensorData::new(flags(given, n_slots), [n_batch, MAX_ARGUMENTS * n_slots]);
+        let (n_batch, n_slots) = (called_with.len(), self.n_slots());
+        let states = TensorData::new(features::flat(states), [n_batch, flat_width(n_slots)]);
+        let flags = TensorData::new(flags(called_with, n_slots), [n_batch, MAX_ARGUMENTS * n_slots]);
         self.state.forward(Tensor::cat(vec![Tensor::from_data(states, &device), Tensor::from_data(flags, &device)], 1))
     }
 

@@ -10,7 +10,7 @@ use rand::Rng;
 
 use crate::scene::SlotIndex;
 use crate::task::Family;
-use crate::training::augment::Views;
+use crate::training::examples::Example;
 
 /// For each container the one that takes over what is brought there; often itself.
 pub(super) struct Merge {
@@ -32,16 +32,11 @@ impl Merge {
         Some(Self { containers, half_m, taken_over_by })
     }
 
-    /// Changes what is seen, and which container is meant.
-    pub(super) fn apply(&self, views: &mut Views) {
-        let n_coordinates = 3 * views.n_slots;
-        for rows in [&mut views.window, &mut views.state] {
-            rows.chunks_exact_mut(n_coordinates + 2).for_each(|row| self.apply_to_row(&mut row[..n_coordinates]));
-        }
-        let example = &mut views.example;
-        let given = example.given.arguments.iter_mut().flatten();
+    /// Changes which container is meant.
+    pub(super) fn apply_to_slots(&self, example: &mut Example) {
+        let called_with = example.called_with.arguments.iter_mut().flatten();
         let called = example.arguments.iter_mut().chain(&mut example.next_move).chain(&mut example.involved);
-        called.chain(given).for_each(|slot| *slot = self.meant_instead_of(*slot));
+        called.chain(called_with).for_each(|slot| *slot = self.meant_instead_of(*slot));
     }
 
     fn meant_instead_of(&self, slot: SlotIndex) -> SlotIndex {
@@ -49,11 +44,11 @@ impl Merge {
         position.and_then(|position| self.taken_over_by.get(position)).map_or(slot, |&other| SlotIndex(other as u16))
     }
 
-    /// Positions are relative to the gripper: one that goes along moves everything that stays.
-    fn apply_to_row(&self, positions: &mut [f32]) {
+    /// Changes what is seen. Positions are relative to the gripper: one that goes along moves everything that stays.
+    pub(super) fn apply_to_row(&self, positions: &mut [[f32; 3]]) {
         let before = positions.to_vec();
         let gripper = self.shift(&before, [0.0; 2]);
-        for (slot, position) in positions.chunks_exact_mut(3).enumerate() {
+        for (slot, position) in positions.iter_mut().enumerate() {
             let goes = !self.containers.contains(&slot);
             let own = if goes { self.shift(&before, [position[0], position[1]]) } else { [0.0; 3] };
             (0..3).for_each(|axis| position[axis] += own[axis] - gripper[axis]);
@@ -61,12 +56,11 @@ impl Merge {
     }
 
     /// How far what lies at a place goes: from the container that it lies in or above to the one that takes over.
-    fn shift(&self, positions: &[f32], place: [f32; 2]) -> [f32; 3] {
-        let at = |slot: usize| -> [f32; 3] { std::array::from_fn(|axis| positions[3 * slot + axis]) };
-        let is_over = |slot: &usize| (0..2).all(|axis| (at(*slot)[axis] - place[axis]).abs() <= self.half_m);
+    fn shift(&self, positions: &[[f32; 3]], place: [f32; 2]) -> [f32; 3] {
+        let is_over = |slot: &usize| (0..2).all(|axis| (positions[*slot][axis] - place[axis]).abs() <= self.half_m);
         let Some(slot) = self.containers.clone().find(is_over) else { return [0.0; 3] };
         let other = self.taken_over_by[slot - self.containers.start];
-        std::array::from_fn(|axis| at(other)[axis] - at(slot)[axis])
+        std::array::from_fn(|axis| positions[other][axis] - positions[slot][axis])
     }
 }
 
@@ -74,15 +68,15 @@ impl Merge {
 mod tests {
     use super::*;
 
-    fn rounded(positions: &[f32]) -> Vec<i32> {
-        positions.iter().map(|coordinate| (coordinate * 100.0).round() as i32).collect()
+    fn rounded(positions: &[[f32; 3]]) -> Vec<i32> {
+        positions.as_flattened().iter().map(|coordinate| (coordinate * 100.0).round() as i32).collect()
     }
 
     /// Two categories and two containers; the second takes over from the first, above which the gripper hangs.
     #[test]
     fn gripper_and_content_go_along_to_the_container_that_takes_over() {
         let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
-        let mut seen = [0.03, 0.02, -0.28, -0.1, -0.4, -0.28, 0.0, 0.0, -0.3, 0.26, 0.0, -0.3];
+        let mut seen = [[0.03, 0.02, -0.28], [-0.1, -0.4, -0.28], [0.0, 0.0, -0.3], [0.26, 0.0, -0.3]];
         merge.apply_to_row(&mut seen);
         assert_eq!(rounded(&seen), [3, 2, -28, -36, -40, -28, -26, 0, -30, 0, 0, -30]);
         assert_eq!(merge.meant_instead_of(SlotIndex(2)), SlotIndex(3));
@@ -92,7 +86,7 @@ mod tests {
     #[test]
     fn content_goes_alone_where_the_gripper_hangs_elsewhere() {
         let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
-        let mut seen = [0.53, 0.02, -0.28, 0.7, 0.1, -0.28, 0.5, 0.0, -0.3, 0.76, 0.0, -0.3];
+        let mut seen = [[0.53, 0.02, -0.28], [0.7, 0.1, -0.28], [0.5, 0.0, -0.3], [0.76, 0.0, -0.3]];
         merge.apply_to_row(&mut seen);
         assert_eq!(rounded(&seen), [79, 2, -28, 70, 10, -28, 50, 0, -30, 76, 0, -30], "what lay in the other stays");
     }
