@@ -158,6 +158,10 @@ pub fn train_on_pictures(
             model.network = model.network.narrowed(narrowed as usize);
         }
     }
+    if let Some(kernel) = training.config.scope_kernel {
+        check_kernel(kernel, data)?;
+        model.network = model.network.with_scope_kernel(kernel as usize);
+    }
     let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
     with_network(&model, seed, &device, learning)?
 }
@@ -170,6 +174,19 @@ fn check_pictures(variant: Variant, gallery: Option<&dyn Gallery>) -> Result<(),
             key: "variant",
             found: format!("{variant} with pictures of {width}x{height} pixels"),
             allowed: "pictures of 32x32 pixels and more, which are halved five times",
+        });
+    }
+    Ok(())
+}
+
+/// A kernel longer than every demonstration sees nothing more.
+fn check_kernel(kernel: u32, data: &DatasetTrials) -> Result<(), TrainError> {
+    let longest = data.trials.iter().map(|trial| trial.n_frames).max().unwrap_or(0);
+    if kernel as usize > longest {
+        return Err(TrainError::Config {
+            key: "scope_kernel",
+            found: format!("{kernel}, and the longest demonstration has {longest} frames"),
+            allowed: "at most as many frames as a demonstration has",
         });
     }
     Ok(())

@@ -113,6 +113,21 @@ impl NetworkConfig {
         }
     }
 
+    /// The same with another number of frames that a scoping label sees around itself.
+    #[must_use]
+    pub fn with_scope_kernel(mut self, scope_kernel: usize) -> Self {
+        let kernel = match &mut self {
+            Self::ObjectCentric(widths) | Self::Detected(_, widths) => &mut widths.scope_kernel,
+            Self::Flattened(widths) | Self::DetectedFlattened(_, widths) => &mut widths.scope_kernel,
+            Self::Instructed(widths) => &mut widths.scope_kernel,
+            Self::ColourSlots(widths) => &mut widths.scope_kernel,
+            Self::Convolved(widths) => &mut widths.flattened.scope_kernel,
+            Self::Keypoints(widths) => &mut widths.scope_kernel,
+        };
+        *kernel = scope_kernel;
+        self
+    }
+
     /// Width and height of the pictures that the network is made for; `None` where it sees none.
     pub fn pixels(&self) -> Option<usize> {
         match self {

@@ -34,6 +34,15 @@ impl Training {
         if self.variant.sees() && self.config.curriculum != Curriculum::Equal {
             return refuse("curriculum", "adaptive".to_owned(), "equal with variants that see");
         }
+        if let Some(kernel) = self.config.scope_kernel {
+            if self.variant.scoping() == ScopingKind::Arguments {
+                let found = format!("{kernel} for variant {}", self.variant);
+                return refuse("scope_kernel", found, "variants that read a specification");
+            }
+            if kernel % 2 == 0 {
+                return refuse("scope_kernel", kernel.to_string(), "odd numbers");
+            }
+        }
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
         }
@@ -133,6 +142,11 @@ pub struct TrainConfig {
     /// some for letters, shadows and darker sides. By default three more than there are slots and a gripper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colours: Option<u32>,
+    /// Frames of the demonstration that a scoping label sees around itself; odd, and no more than the longest
+    /// demonstration has. By default 5. Object Sorting with flattened networks needs 11: to end a scope a frame must show
+    /// which category the segment before was of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scope_kernel: Option<u32>,
     /// How a detector is trained before the network behind it; for variants that have one.
     #[serde(skip_serializing_if = "DetectorTraining::is_default")]
     pub detector: DetectorTraining,
@@ -160,6 +174,7 @@ impl Default for TrainConfig {
             recovery_states: None,
             merge_containers: 0.0,
             colours: None,
+            scope_kernel: None,
             detector: DetectorTraining::default(),
             checkpoint_every: 100,
             metrics_every: 10,

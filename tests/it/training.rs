@@ -440,6 +440,26 @@ fn instructions_are_for_variant_ntp_without_other_names_for_slots() {
 }
 
 #[test]
+fn a_scope_kernel_is_the_network_s_and_one_that_is_even_or_too_long_is_refused() {
+    let data = towers();
+    let with = |kernel| TrainConfig { steps: Some(1), scope_kernel: Some(kernel), ..short() };
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |training: &Training| train_until(training, &data, folder.path(), None).unwrap_err().to_string();
+    assert_eq!(refused(&ntp(with(4))), "scope_kernel is 4; allowed: odd numbers");
+    assert_eq!(
+        refused(&ntp(with(11))),
+        "scope_kernel is 11, and the longest demonstration has 9 frames; allowed: at most as many frames as a \
+         demonstration has"
+    );
+    let npi = Training { variant: Variant::NPI, ..ntp(with(3)) };
+    assert_eq!(refused(&npi), "scope_kernel is 3 for variant npi; allowed: variants that read a specification");
+    train_until(&ntp(with(9)), &data, folder.path(), None).unwrap();
+    let config = ntp::model::load_config(folder.path()).unwrap();
+    let ntp::model::NetworkConfig::ObjectCentric(widths) = config.network else { panic!("{:?}", config.network) };
+    assert_eq!(widths.scope_kernel, 9);
+}
+
+#[test]
 fn an_example_of_instructions_has_the_sentences_of_its_sub_task() {
     let data = towers();
     let form = SpecificationForm::Instructions;
