@@ -162,6 +162,9 @@ pub fn train_on_pictures(
         check_kernel(kernel, data)?;
         model.network = model.network.with_scope_kernel(kernel as usize);
     }
+    if training.config.relations {
+        model.network = model.network.with_relations();
+    }
     let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
     with_network(&model, seed, &device, learning)?
 }

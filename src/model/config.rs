@@ -128,6 +128,16 @@ impl NetworkConfig {
         self
     }
 
+    /// The same with the displacements between slots beside their positions; widths that read no vector of positions
+    /// stay as they are.
+    #[must_use]
+    pub fn with_relations(mut self) -> Self {
+        if let Self::Flattened(widths) | Self::DetectedFlattened(_, widths) = &mut self {
+            widths.relations = true;
+        }
+        self
+    }
+
     /// Width and height of the pictures that the network is made for; `None` where it sees none.
     pub fn pixels(&self) -> Option<usize> {
         match self {
@@ -137,6 +147,15 @@ impl NetworkConfig {
             Self::Detected(config, _) => Some(config.perception.pixels),
             Self::Keypoints(config) => Some(config.perception.pixels),
             Self::DetectedFlattened(config, _) => Some(config.pixels),
+        }
+    }
+
+    fn has_relations(&self) -> bool {
+        match self {
+            Self::Flattened(widths) | Self::DetectedFlattened(_, widths) => widths.relations,
+            Self::Convolved(widths) => widths.flattened.relations,
+            Self::ObjectCentric(_) | Self::Instructed(_) | Self::ColourSlots(_) | Self::Keypoints(_) => false,
+            Self::Detected(..) => false,
         }
     }
 
@@ -256,6 +275,10 @@ impl ModelConfig {
         let knows_tasks = variant.scoping() == ScopingKind::Arguments;
         let allowed = "none but for scoping arguments, which knows tasks by name";
         ConfigError::unless(knows_tasks || tasks.is_empty(), "tasks", tasks.len(), allowed)?;
+        let reads_vectors =
+            variant.scoping() != ScopingKind::Arguments && !matches!(network, NetworkConfig::Convolved(_));
+        let allowed = "off but for vectors of positions beside a specification";
+        ConfigError::unless(reads_vectors || !network.has_relations(), "relations", "on", allowed)?;
         network.check(*n_slots)
     }
 }

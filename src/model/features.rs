@@ -55,21 +55,27 @@ pub(crate) fn agents(rows: &ObservationRows) -> Vec<f32> {
     rows.iter().flat_map(|row| row.gripper.iter().copied()).collect()
 }
 
-/// All slots side by side: `[rows, flat_width(N)]`.
-pub(crate) fn flat(rows: &ObservationRows) -> Vec<f32> {
-    let mut features = Vec::with_capacity(rows.len() * flat_width(rows.n_slots()));
+/// All slots side by side, and behind them with `relations` each pair's displacement: `[rows, flat_width(N)]`.
+pub(crate) fn flat(rows: &ObservationRows, relations: bool) -> Vec<f32> {
+    let mut features = Vec::with_capacity(rows.len() * flat_width(rows.n_slots(), relations));
     for row in rows.iter() {
         for position in row.positions {
             features.extend(position_features(*position, FLAT_HEIGHT_GAIN));
         }
         features.extend_from_slice(row.gripper);
+        for (after, a) in row.positions.iter().enumerate().filter(|_| relations) {
+            for b in &row.positions[..after] {
+                features.extend(position_features([a[0] - b[0], a[1] - b[1], a[2] - b[2]], FLAT_HEIGHT_GAIN));
+            }
+        }
     }
     features
 }
 
 /// Width of [`flat`].
-pub(crate) fn flat_width(n_slots: usize) -> usize {
-    POSITION_WIDTH * n_slots + AGENT_WIDTH
+pub(crate) fn flat_width(n_slots: usize, relations: bool) -> usize {
+    let n_pairs = if relations { n_slots * n_slots.saturating_sub(1) / 2 } else { 0 };
+    POSITION_WIDTH * (n_slots + n_pairs) + AGENT_WIDTH
 }
 
 fn position_features([x, y, z]: [f32; 3], height_gain: f32) -> [f32; POSITION_WIDTH] {
@@ -83,7 +89,7 @@ fn bump(distance_m: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{OBJECT_WIDTH, POSITION_WIDTH, objects, pairs};
+    use super::{OBJECT_WIDTH, POSITION_WIDTH, flat, flat_width, objects, pairs};
     use crate::trace::ObservationRows;
 
     fn row() -> ObservationRows {
@@ -98,6 +104,17 @@ mod tests {
         assert_eq!(upper_lower[3..5], [1.0, 1.0]);
         assert!((upper_lower[5] - (-1.0_f32).exp()).abs() < 1e-6);
         assert_eq!(pairs[..6], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn relations_stand_behind_what_is_read_without_them() {
+        let (plain, related) = (flat(&row(), false), flat(&row(), true));
+        assert_eq!((plain.len(), related.len()), (flat_width(2, false), flat_width(2, true)));
+        assert_eq!((flat_width(8, false), flat_width(8, true)), (50, 218));
+        assert_eq!(related[..plain.len()], plain);
+        let [x, y, z, bump_x, bump_y, bump_z] = related[plain.len()..] else { panic!("{related:?}") };
+        assert_eq!([x, y, bump_x, bump_y], [0.0, 0.0, 1.0, 1.0]);
+        assert!((z + 1.0).abs() < 1e-5 && (bump_z - (-1.0_f32).exp()).abs() < 1e-5, "the upper one is 5 cm above");
     }
 
     #[test]

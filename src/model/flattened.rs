@@ -114,7 +114,7 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
 
     fn demonstration(&self, windows: &Windows, percepts: &V::Percepts) -> Result<FlatDemonstration, ReadError> {
         let device = self.device();
-        let frames = V::of_windows(windows, percepts, &device)?;
+        let frames = self.vectors.of_windows(windows, percepts, &device)?;
         Ok(FlatDemonstration { frames, padding: windows.padding(&device) })
     }
 
@@ -130,7 +130,7 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
         percepts: &V::Percepts,
     ) -> Result<FlatReading, ReadError> {
         let FlatDemonstration { frames, padding } = demonstration;
-        let state = self.state.forward(V::of_states(states, percepts, &self.device())?);
+        let state = self.state.forward(self.vectors.of_states(states, percepts, &self.device())?);
         let (convolved, summary) = self.specification.forward(frames.clone(), padding.as_ref());
         Ok(FlatReading { demonstration: demonstration.clone(), convolved, summary, state })
     }

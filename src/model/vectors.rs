@@ -27,18 +27,26 @@ pub struct FlattenedConfig {
     pub scope_kernel: usize,
     /// Frames that an argument sees around itself; odd. Default 3.
     pub argument_kernel: usize,
+    /// Whether the displacements between slots stand beside their positions. Default no, as in the paper.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub relations: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_off(setting: &bool) -> bool {
+    !setting
 }
 
 impl Default for FlattenedConfig {
     fn default() -> Self {
-        Self { width: 96, program_width: 32, scope_kernel: 5, argument_kernel: 3 }
+        Self { width: 96, program_width: 32, scope_kernel: 5, argument_kernel: 3, relations: false }
     }
 }
 
 impl FlattenedConfig {
     /// Whether a network can have these sizes.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        let &Self { width, program_width, scope_kernel, argument_kernel } = self;
+        let &Self { width, program_width, scope_kernel, argument_kernel, relations: _ } = self;
         check_sizes(&[("width", width), ("program_width", program_width)])?;
         check_kernels(&[("scope_kernel", scope_kernel), ("argument_kernel", argument_kernel)])
     }
@@ -68,19 +76,22 @@ pub trait Vectors: Module + ModuleDisplay + Sync + Sized + 'static {
     /// # Errors
     ///
     /// [`ReadError`] for windows of another form.
-    fn of_windows(windows: &Windows, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<3>, ReadError>;
+    fn of_windows(&self, windows: &Windows, percepts: &Self::Percepts, device: &Device)
+    -> Result<Tensor<3>, ReadError>;
 
     /// Of each state, `[B, features]`.
     ///
     /// # Errors
     ///
     /// [`ReadError`] for states of another form.
-    fn of_states(states: &States, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<2>, ReadError>;
+    fn of_states(&self, states: &States, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<2>, ReadError>;
 }
 
-/// All slots' positions side by side.
+/// All slots' positions side by side, and where asked for the displacements between them.
 #[derive(Module, Debug)]
-pub struct Positions;
+pub struct Positions {
+    relations: bool,
+}
 
 impl Positions {
     /// Slots have parameters of their own, so every label must have been every slot. Jittered grippers and what was
@@ -93,29 +104,30 @@ impl Vectors for Positions {
     type Config = FlattenedConfig;
     type Percepts = ();
 
-    fn new(_config: &FlattenedConfig, _init: &mut Init) -> Self {
-        Self
+    fn new(config: &FlattenedConfig, _init: &mut Init) -> Self {
+        Self { relations: config.relations }
     }
 
     fn widths(config: &FlattenedConfig) -> &FlattenedConfig {
         config
     }
 
-    fn width(_config: &FlattenedConfig, n_slots: usize) -> usize {
-        flat_width(n_slots)
+    fn width(config: &FlattenedConfig, n_slots: usize) -> usize {
+        flat_width(n_slots, config.relations)
     }
 
     fn perceive(&self, _pictures: &Pictures) {}
 
-    fn of_windows(windows: &Windows, (): &(), device: &Device) -> Result<Tensor<3>, ReadError> {
-        let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots())];
-        Ok(Tensor::from_data(TensorData::new(features::flat(windows.observations()?), shape), device))
+    fn of_windows(&self, windows: &Windows, (): &(), device: &Device) -> Result<Tensor<3>, ReadError> {
+        let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots(), self.relations)];
+        let features = features::flat(windows.observations()?, self.relations);
+        Ok(Tensor::from_data(TensorData::new(features, shape), device))
     }
 
-    fn of_states(states: &States, (): &(), device: &Device) -> Result<Tensor<2>, ReadError> {
+    fn of_states(&self, states: &States, (): &(), device: &Device) -> Result<Tensor<2>, ReadError> {
         let rows = states.observations()?;
-        let shape = [rows.len(), flat_width(rows.n_slots())];
-        Ok(Tensor::from_data(TensorData::new(features::flat(rows), shape), device))
+        let shape = [rows.len(), flat_width(rows.n_slots(), self.relations)];
+        Ok(Tensor::from_data(TensorData::new(features::flat(rows, self.relations), shape), device))
     }
 }
 
@@ -192,13 +204,13 @@ impl Vectors for Convolved {
         seen.flatten(1, 3)
     }
 
-    fn of_windows(windows: &Windows, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<3>, ReadError> {
+    fn of_windows(&self, windows: &Windows, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<3>, ReadError> {
         let [n_pictures, width] = percepts.dims();
         let features = percepts.clone().select(0, picked(windows.pictures()?, n_pictures, device)?);
         Ok(features.reshape([windows.n_windows(), windows.n_frames(), width]))
     }
 
-    fn of_states(states: &States, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<2>, ReadError> {
+    fn of_states(&self, states: &States, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<2>, ReadError> {
         let n_pictures = percepts.dims()[0];
         Ok(percepts.clone().select(0, picked(states.pictures()?, n_pictures, device)?))
     }

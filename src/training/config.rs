@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::{ScopingKind, Variant};
+use crate::model::{EncoderKind, ScopingKind, Variant};
 use crate::trace::SpecificationForm;
 use crate::training::TrainError;
 use crate::training::detector_config::DetectorTraining;
@@ -42,6 +42,11 @@ impl Training {
             if kernel % 2 == 0 {
                 return refuse("scope_kernel", kernel.to_string(), "odd numbers");
             }
+        }
+        let reads_vectors = matches!(self.variant.encoder(), EncoderKind::Flattened | EncoderKind::DetectedFlattened);
+        if self.config.relations && (!reads_vectors || self.variant.scoping() == ScopingKind::Arguments) {
+            let found = format!("on for variant {}", self.variant);
+            return refuse("relations", found, "on with flattened encoders of positions beside a specification");
         }
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
@@ -147,6 +152,10 @@ pub struct TrainConfig {
     /// which category the segment before was of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scope_kernel: Option<u32>,
+    /// Whether flattened networks read the displacements between slots beside their positions. Off by default, as in the
+    /// paper, whose discussion names relationships between objects as future work.
+    #[serde(skip_serializing_if = "is_off")]
+    pub relations: bool,
     /// How a detector is trained before the network behind it; for variants that have one.
     #[serde(skip_serializing_if = "DetectorTraining::is_default")]
     pub detector: DetectorTraining,
@@ -154,6 +163,11 @@ pub struct TrainConfig {
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
     pub metrics_every: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_off(setting: &bool) -> bool {
+    !setting
 }
 
 impl Default for TrainConfig {
@@ -175,6 +189,7 @@ impl Default for TrainConfig {
             merge_containers: 0.0,
             colours: None,
             scope_kernel: None,
+            relations: false,
             detector: DetectorTraining::default(),
             checkpoint_every: 100,
             metrics_every: 10,

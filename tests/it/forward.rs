@@ -77,7 +77,8 @@ impl NetworkUse for Saying {
 fn say(variant: Variant, form: SpecificationForm) -> Said {
     let object_centric =
         ObjectCentricConfig { pair_width: 1, width: 1, program_width: 1, scope_kernel: 1, argument_kernel: 1 };
-    let flattened = FlattenedConfig { width: 1, program_width: 1, scope_kernel: 1, argument_kernel: 1 };
+    let flattened =
+        FlattenedConfig { width: 1, program_width: 1, scope_kernel: 1, argument_kernel: 1, relations: false };
     let mut config = ModelConfig::new(variant, form, Family::BlockStacking, 1, serde_json::Value::Null);
     config.network = match config.network {
         NetworkConfig::ObjectCentric(_) => NetworkConfig::ObjectCentric(object_centric),

@@ -460,6 +460,26 @@ fn a_scope_kernel_is_the_network_s_and_one_that_is_even_or_too_long_is_refused()
 }
 
 #[test]
+fn relations_are_read_by_flattened_networks_alone() {
+    let data = towers();
+    let related = TrainConfig { steps: Some(1), relations: true, ..short() };
+    let folder = tempfile::tempdir().unwrap();
+    let error = train_until(&ntp(related.clone()), &data, folder.path(), None).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "relations is on for variant ntp; allowed: on with flattened encoders of positions beside a specification"
+    );
+    let parameters = |relations| {
+        let config = TrainConfig { relations, ..related.clone() };
+        let training = Training { variant: Variant::NTP_PAPER, ..ntp(config) };
+        train_until(&training, &data, folder.path(), None).unwrap();
+        ntp::model::inspect(folder.path()).unwrap().parameters
+    };
+    // Three layers read 28 displacements of 6 numbers more.
+    assert_eq!(parameters(true), parameters(false) + 3 * 28 * 6 * 96);
+}
+
+#[test]
 fn an_example_of_instructions_has_the_sentences_of_its_sub_task() {
     let data = towers();
     let form = SpecificationForm::Instructions;

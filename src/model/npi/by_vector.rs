@@ -28,7 +28,7 @@ impl CallEncoder for ByVector {
     fn new(config: &FlattenedConfig, n_slots: usize, init: &mut Init) -> Self {
         let &FlattenedConfig { width, program_width, .. } = config;
         Self {
-            state: init.mlp(&[flat_width(n_slots) + MAX_ARGUMENTS * n_slots, width, width]),
+            state: init.mlp(&[flat_width(n_slots, false) + MAX_ARGUMENTS * n_slots, width, width]),
             hidden: init.mlp(&[2 * width + program_width, width]),
             slots: init.linear(width, MAX_ARGUMENTS * n_slots),
         }
@@ -41,7 +41,7 @@ impl CallEncoder for ByVector {
     fn read(&self, states: &ObservationRows, called_with: &[CalledWith]) -> Tensor<2> {
         let device = self.device();
         let (n_batch, n_slots) = (called_with.len(), self.n_slots());
-        let states = TensorData::new(features::flat(states), [n_batch, flat_width(n_slots)]);
+        let states = TensorData::new(features::flat(states, false), [n_batch, flat_width(n_slots, false)]);
         let flags = TensorData::new(flags(called_with, n_slots), [n_batch, MAX_ARGUMENTS * n_slots]);
         self.state.forward(Tensor::cat(vec![Tensor::from_data(states, &device), Tensor::from_data(flags, &device)], 1))
     }
