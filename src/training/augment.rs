@@ -8,9 +8,10 @@ use rand::seq::SliceRandom as _;
 use crate::model::{SpecificationRows, States};
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
+use crate::seed::Seed;
 use crate::task::Family;
 use crate::trace::{ObservationRow, ObservationRowMut};
-use crate::training::augment::containers::Merge;
+use crate::training::augment::containers::{Aside, Merge};
 use crate::training::config::TrainConfig;
 use crate::training::examples::Example;
 
@@ -39,7 +40,10 @@ impl Views {
         let place = Place::draw(self.n_slots, rng);
         let order = relabelling(family, self.n_slots, rng);
         if let Some(merge) = merge.filter(|_| merged < config.merge_containers) {
-            self.rows_mut().for_each(|mut row| merge.apply_to_row(row.positions));
+            let seed = Seed(u64::from(merged.to_bits()) << 32 | u64::from(jittered.to_bits()));
+            let Aside { demonstrated, seen } = Aside::draw(config.merge_aside_m, self.n_slots, seed);
+            self.window.iter_mut().for_each(|row| merge.apply_to_row(row.positions, &demonstrated));
+            self.state.iter_mut().for_each(|row| merge.apply_to_row(row.positions, &seen));
             merge.apply_to_slots(&mut self.example);
         }
         if scattered < config.scatter_bystanders {

@@ -143,6 +143,11 @@ pub struct TrainConfig {
     /// How often whatever goes into one container goes into another (0 to 1), so that several categories share one as
     /// in mappings that no training task shows. Off by default; for Object Sorting.
     pub merge_containers: f32,
+    /// How far what goes into another container lies from where it would have lain, across the table and in metres (0 to
+    /// 0.1), apart in demonstration and state. Training tasks show the first of a category in its container's middle;
+    /// where categories share one it falls beside the others. Off by default.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub merge_aside_m: f32,
     /// How many colours are told apart by networks on colour slots: one for each thing to be seen, one for the gripper, and
     /// some for letters, shadows and darker sides. By default three more than there are slots and a gripper.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -170,6 +175,11 @@ fn is_off(setting: &bool) -> bool {
     !setting
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_zero(setting: &f32) -> bool {
+    *setting == 0.0
+}
+
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
@@ -187,6 +197,7 @@ impl Default for TrainConfig {
             scatter_bystanders: 0.0,
             recovery_states: None,
             merge_containers: 0.0,
+            merge_aside_m: 0.0,
             colours: None,
             scope_kernel: None,
             relations: false,
@@ -278,6 +289,12 @@ impl TrainConfig {
         }
         let numbers = (positive.into_iter().map(|(key, value)| (key, value, value > 0.0, "greater than 0")))
             .chain(shares.map(|(key, value)| (key, value, (0.0..=1.0).contains(&value), "from 0 to 1")))
+            .chain(std::iter::once((
+                "merge_aside_m",
+                self.merge_aside_m,
+                (0.0..=0.1).contains(&self.merge_aside_m),
+                "from 0 to 0.1",
+            )))
             .chain(weights.map(|(key, value)| (key, value, value >= 0.0, "at least 0")));
         match numbers.into_iter().find(|(_, value, fits, _)| !fits || !value.is_finite()) {
             Some((key, value, _, allowed)) => Err(refuse(key, value.to_string(), allowed)),

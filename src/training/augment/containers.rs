@@ -9,8 +9,27 @@ use std::ops::Range;
 use rand::Rng;
 
 use crate::scene::SlotIndex;
+use crate::seed::Seed;
 use crate::task::Family;
 use crate::training::examples::Example;
+
+/// What lies so near to the gripper, across the table and in metres, is held or has just been let go.
+const AT_GRIPPER_M: f32 = 0.02;
+
+/// How far what is taken over is put aside: for each slot in x and y, apart in demonstration and state.
+pub(super) struct Aside {
+    pub(super) demonstrated: Vec<[f32; 2]>,
+    pub(super) seen: Vec<[f32; 2]>,
+}
+
+impl Aside {
+    /// Draws by a seed of its own, so that no other augmentation draws otherwise with it.
+    pub(super) fn draw(reach_m: f32, n_slots: usize, seed: Seed) -> Self {
+        let mut rng = seed.derive("aside", &[]).rng();
+        let mut draw = || (0..n_slots).map(|_| [(); 2].map(|()| reach_m * rng.random_range(-1.0..1.0))).collect();
+        Self { demonstrated: draw(), seen: draw() }
+    }
+}
 
 /// For each container the one that takes over what is brought there; often itself.
 pub(super) struct Merge {
@@ -45,13 +64,20 @@ impl Merge {
     }
 
     /// Changes what is seen. Positions are relative to the gripper: one that goes along moves everything that stays.
-    pub(super) fn apply_to_row(&self, positions: &mut [[f32; 3]]) {
+    ///
+    /// What is taken over is put `aside` besides, in x and y and in metres for each slot, since the first of a category
+    /// that falls into a container in use does not fall into its middle. What is at the gripper stays there.
+    pub(super) fn apply_to_row(&self, positions: &mut [[f32; 3]], aside: &[[f32; 2]]) {
         let before = positions.to_vec();
         let gripper = self.shift(&before, [0.0; 2]);
         for (slot, position) in positions.iter_mut().enumerate() {
             let goes = !self.containers.contains(&slot);
             let own = if goes { self.shift(&before, [position[0], position[1]]) } else { [0.0; 3] };
+            let is_at_gripper = position[0].hypot(position[1]) < AT_GRIPPER_M;
+            let is_taken_over = own != [0.0; 3] && !is_at_gripper;
             (0..3).for_each(|axis| position[axis] += own[axis] - gripper[axis]);
+            let aside = aside.get(slot).filter(|_| is_taken_over);
+            aside.into_iter().for_each(|aside| (0..2).for_each(|axis| position[axis] += aside[axis]));
         }
     }
 
@@ -77,7 +103,7 @@ mod tests {
     fn gripper_and_content_go_along_to_the_container_that_takes_over() {
         let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
         let mut seen = [[0.03, 0.02, -0.28], [-0.1, -0.4, -0.28], [0.0, 0.0, -0.3], [0.26, 0.0, -0.3]];
-        merge.apply_to_row(&mut seen);
+        merge.apply_to_row(&mut seen, &[]);
         assert_eq!(rounded(&seen), [3, 2, -28, -36, -40, -28, -26, 0, -30, 0, 0, -30]);
         assert_eq!(merge.meant_instead_of(SlotIndex(2)), SlotIndex(3));
         assert_eq!(merge.meant_instead_of(SlotIndex(1)), SlotIndex(1), "a category stays what it is");
@@ -87,7 +113,29 @@ mod tests {
     fn content_goes_alone_where_the_gripper_hangs_elsewhere() {
         let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
         let mut seen = [[0.53, 0.02, -0.28], [0.7, 0.1, -0.28], [0.5, 0.0, -0.3], [0.76, 0.0, -0.3]];
-        merge.apply_to_row(&mut seen);
+        merge.apply_to_row(&mut seen, &[]);
         assert_eq!(rounded(&seen), [79, 2, -28, 70, 10, -28, 50, 0, -30, 76, 0, -30], "what lay in the other stays");
+    }
+
+    #[test]
+    fn what_is_taken_over_is_put_aside_but_for_what_is_at_the_gripper() {
+        let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
+        let aside = [[0.04, -0.03]; 4];
+        // Both categories lie in the first container; the gripper has just let go of the second.
+        let mut seen = [[0.03, 0.02, -0.28], [0.0, 0.0, 0.0], [0.0, 0.0, -0.3], [0.26, 0.0, -0.3]];
+        merge.apply_to_row(&mut seen, &aside);
+        assert_eq!(rounded(&seen), [7, -1, -28, 0, 0, 0, -26, 0, -30, 0, 0, -30]);
+        // What lies in the container that takes over stays.
+        let mut stays = [[0.53, 0.02, -0.28], [0.7, 0.1, -0.28], [0.25, 0.0, -0.3], [0.5, 0.0, -0.3]];
+        let before = rounded(&stays);
+        merge.apply_to_row(&mut stays, &aside);
+        assert_eq!(rounded(&stays), before);
+    }
+
+    #[test]
+    fn demonstration_and_state_are_put_aside_apart_and_within_reach() {
+        let Aside { demonstrated, seen } = Aside::draw(0.05, 8, Seed(1));
+        assert!(demonstrated.iter().chain(&seen).flatten().all(|aside| aside.abs() <= 0.05));
+        assert!(demonstrated.iter().zip(&seen).all(|(a, b)| a != b));
     }
 }
