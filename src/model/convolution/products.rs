@@ -14,16 +14,21 @@ use crate::model::convolution::tiles::Geometry;
 const N_SUMS: usize = 8;
 
 /// See [`super::Convolution::forward`].
-pub(super) fn convolve(pictures: &FlexTensor, weight: &FlexTensor, bias: &FlexTensor, of: Geometry) -> FlexTensor {
+pub(super) fn convolve(
+    pictures: &FlexTensor,
+    weight: &FlexTensor,
+    bias: &FlexTensor,
+    geometry: Geometry,
+) -> FlexTensor {
     let (pictures, bias) = (pictures.to_contiguous(), bias.to_contiguous());
     let (pictures, bias) = (values(&pictures), values(&bias));
-    let ([n_rows, n_columns], n_outputs) = (of.outputs(), bias.len());
-    let mut output = vec![0.0; of.pictures[0] * n_rows * n_columns * n_outputs];
+    let ([n_rows, n_columns], n_outputs) = (geometry.outputs(), bias.len());
+    let mut output = vec![0.0; geometry.n_pictures() * n_rows * n_columns * n_outputs];
     pictures
-        .par_chunks((of.chunk() * of.picture()).max(1))
-        .zip(output.par_chunks_mut((of.chunk() * n_rows * n_columns * n_outputs).max(1)))
+        .par_chunks((geometry.chunk() * geometry.picture_len()).max(1))
+        .zip(output.par_chunks_mut((geometry.chunk() * n_rows * n_columns * n_outputs).max(1)))
         .for_each(|(pictures, output)| {
-            each_tile(of, pictures, |rows, patches| {
+            each_tile(geometry, pictures, |rows, patches| {
                 let products = Flex::float_matmul(patches, weight.clone());
                 let output = &mut output[rows.start * n_columns * n_outputs..rows.end * n_columns * n_outputs];
                 let pairs = output.chunks_exact_mut(n_outputs).zip(values(&products).chunks_exact(n_outputs));
@@ -33,35 +38,37 @@ pub(super) fn convolve(pictures: &FlexTensor, weight: &FlexTensor, bias: &FlexTe
                 });
             });
         });
-    tensor(output, [of.pictures[0], n_rows, n_columns, n_outputs])
+    tensor(output, [geometry.n_pictures(), n_rows, n_columns, n_outputs])
 }
 
 /// Of the pictures: each patch's is the product of its output's with the weight.
-pub(super) fn input_gradient(gradient: &FlexTensor, weight: &FlexTensor, of: Geometry) -> FlexTensor {
-    let [_, n_columns] = of.outputs();
+pub(super) fn input_gradient(gradient: &FlexTensor, weight: &FlexTensor, geometry: Geometry) -> FlexTensor {
+    let [_, n_columns] = geometry.outputs();
     let (gradient, weight) = (rows_of(gradient), weight.transpose(0, 1));
-    let mut pictures = vec![0.0; of.pictures[0] * of.picture()];
-    pictures.par_chunks_mut((of.chunk() * of.picture()).max(1)).enumerate().for_each(|(chunk, pictures)| {
-        let first = chunk * of.chunk() * of.outputs()[0];
-        for rows in of.tiles(pictures.len() / of.picture()) {
-            let gradient = gradient.narrow(0, (first + rows.start) * n_columns, rows.len() * n_columns);
-            let patches = Flex::float_matmul(gradient, weight.clone());
-            of.scatter(values(&patches), rows, pictures);
-        }
-    });
-    tensor(pictures, of.pictures)
+    let mut pictures = vec![0.0; geometry.n_pictures() * geometry.picture_len()];
+    pictures.par_chunks_mut((geometry.chunk() * geometry.picture_len()).max(1)).enumerate().for_each(
+        |(chunk, pictures)| {
+            let first = chunk * geometry.chunk() * geometry.outputs()[0];
+            for rows in geometry.tiles(pictures.len() / geometry.picture_len()) {
+                let gradient = gradient.narrow(0, (first + rows.start) * n_columns, rows.len() * n_columns);
+                let patches = Flex::float_matmul(gradient, weight.clone());
+                geometry.scatter(values(&patches), rows, pictures);
+            }
+        },
+    );
+    tensor(pictures, geometry.pictures)
 }
 
 /// Of the weight: patches times their outputs' gradients, added up.
-pub(super) fn weight_gradient(gradient: &FlexTensor, pictures: &FlexTensor, of: Geometry) -> FlexTensor {
-    let [n_rows, n_columns] = of.outputs();
+pub(super) fn weight_gradient(gradient: &FlexTensor, pictures: &FlexTensor, geometry: Geometry) -> FlexTensor {
+    let [n_rows, n_columns] = geometry.outputs();
     let (gradient, pictures) = (rows_of(gradient), pictures.to_contiguous());
-    let chunks: Vec<&[f32]> = values(&pictures).chunks((of.chunk() * of.picture()).max(1)).collect();
+    let chunks: Vec<&[f32]> = values(&pictures).chunks((geometry.chunk() * geometry.picture_len()).max(1)).collect();
     let sum_of_chunks = |nth: usize| {
         let mut sum = None;
         for (chunk, pictures) in chunks.iter().enumerate().skip(nth).step_by(N_SUMS) {
-            each_tile(of, pictures, |rows, patches| {
-                let first = (chunk * of.chunk() * n_rows + rows.start) * n_columns;
+            each_tile(geometry, pictures, |rows, patches| {
+                let first = (chunk * geometry.chunk() * n_rows + rows.start) * n_columns;
                 let gradient = gradient.narrow(0, first, rows.len() * n_columns);
                 add(&mut sum, Flex::float_matmul(patches.transpose(0, 1), gradient));
             });
@@ -71,7 +78,9 @@ pub(super) fn weight_gradient(gradient: &FlexTensor, pictures: &FlexTensor, of: 
     let sums: Vec<Option<FlexTensor>> = (0..N_SUMS).into_par_iter().map(sum_of_chunks).collect();
     let mut total = None;
     sums.into_iter().flatten().for_each(|sum| add(&mut total, sum));
-    total.unwrap_or_else(|| tensor(vec![0.0; of.patch() * width(&gradient)], [of.patch(), width(&gradient)]))
+    total.unwrap_or_else(|| {
+        tensor(vec![0.0; geometry.patch_len() * width(&gradient)], [geometry.patch_len(), width(&gradient)])
+    })
 }
 
 /// Of the bias: the outputs' gradients, added up.
@@ -82,15 +91,15 @@ pub(super) fn bias_gradient(gradient: &FlexTensor) -> FlexTensor {
 }
 
 /// Gathers the patches of pictures portion by portion, `[rows * columns, patch]` each.
-fn each_tile(of: Geometry, pictures: &[f32], mut each: impl FnMut(Range<usize>, FlexTensor)) {
-    let [_, n_columns] = of.outputs();
+fn each_tile(geometry: Geometry, pictures: &[f32], mut each: impl FnMut(Range<usize>, FlexTensor)) {
+    let [_, n_columns] = geometry.outputs();
     let mut buffer: Option<FlexTensor> = None;
-    for rows in of.tiles(pictures.len() / of.picture()) {
+    for rows in geometry.tiles(pictures.len() / geometry.picture_len()) {
         let n_patches = rows.len() * n_columns;
-        let n_numbers = n_patches * of.patch();
+        let n_numbers = n_patches * geometry.patch_len();
         // The first portion is the largest. Nobody else holds the buffer any more: it is written in place.
-        let buffer = buffer.get_or_insert_with(|| tensor(vec![0.0; n_numbers], [n_patches, of.patch()]));
-        of.gather(pictures, rows.clone(), &mut buffer.storage_mut()[..n_numbers]);
+        let buffer = buffer.get_or_insert_with(|| tensor(vec![0.0; n_numbers], [n_patches, geometry.patch_len()]));
+        geometry.gather(pictures, rows.clone(), &mut buffer.storage_mut()[..n_numbers]);
         each(rows, buffer.narrow(0, 0, n_patches));
     }
 }

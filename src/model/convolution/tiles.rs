@@ -32,32 +32,37 @@ impl Geometry {
         [height, width].map(|size| (size + 2 * self.padding).saturating_sub(self.kernel) / self.stride + 1)
     }
 
+    /// How many pictures.
+    pub(super) fn n_pictures(&self) -> usize {
+        self.pictures[0]
+    }
+
     /// Numbers of a picture.
-    pub(super) fn picture(&self) -> usize {
+    pub(super) fn picture_len(&self) -> usize {
         self.pictures[1..].iter().product()
     }
 
     /// Numbers of a patch.
-    pub(super) fn patch(&self) -> usize {
+    pub(super) fn patch_len(&self) -> usize {
         self.kernel * self.kernel * self.pictures[3]
     }
 
     /// How many whole pictures are worked on by one thread at a time.
     pub(super) fn chunk(&self) -> usize {
         let [rows, columns] = self.outputs();
-        (TILE / (rows * columns * self.patch()).max(1)).max(1)
+        (TILE / (rows * columns * self.patch_len()).max(1)).max(1)
     }
 
     /// Rows of outputs, counted through `n_pictures`, in portions that fit the cache.
     pub(super) fn tiles(&self, n_pictures: usize) -> impl Iterator<Item = Range<usize>> {
         let [rows, columns] = self.outputs();
-        let (n_rows, portion) = (n_pictures * rows, (TILE / (columns * self.patch()).max(1)).max(1));
+        let (n_rows, portion) = (n_pictures * rows, (TILE / (columns * self.patch_len()).max(1)).max(1));
         (0..n_rows).step_by(portion).map(move |first| first..(first + portion).min(n_rows))
     }
 
     /// Copies the patches of rows out of pictures.
     pub(super) fn gather(&self, pictures: &[f32], rows: Range<usize>, patches: &mut [f32]) {
-        for (patch, origin) in patches.chunks_exact_mut(self.patch()).zip(self.origins(rows)) {
+        for (patch, origin) in patches.chunks_exact_mut(self.patch_len()).zip(self.origins(rows)) {
             for Line { whole, inside, from } in self.lines(origin) {
                 let n = inside.len();
                 patch[whole.start..inside.start].fill(0.0);
@@ -69,7 +74,7 @@ impl Geometry {
 
     /// Adds the patches of rows to pictures.
     pub(super) fn scatter(&self, patches: &[f32], rows: Range<usize>, pictures: &mut [f32]) {
-        for (patch, origin) in patches.chunks_exact(self.patch()).zip(self.origins(rows)) {
+        for (patch, origin) in patches.chunks_exact(self.patch_len()).zip(self.origins(rows)) {
             for Line { inside, from, .. } in self.lines(origin) {
                 let to = &mut pictures[from..from + inside.len()];
                 to.iter_mut().zip(&patch[inside]).for_each(|(sum, value)| *sum += value);
