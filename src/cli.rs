@@ -12,7 +12,10 @@ use crate::publish::{Date, License, Place, Release};
 use crate::render::Channel;
 use crate::task::{Family, Split};
 
-/// Neural Task Programming as a dataset pipeline.
+/// Hierarchical robot demonstrations with true labels: made, learned from, acted and judged by one pipeline file.
+///
+/// Neural Task Programming (NTP) reads one demonstration of a task that it has never seen, takes it apart into programs
+/// that call each other, and acts the task.
 #[derive(Debug, Parser)]
 #[command(name = "ntp", version, max_term_width = 100, after_help = AFTER_HELP)]
 pub struct Cli {
@@ -22,6 +25,23 @@ pub struct Cli {
 }
 
 const AFTER_HELP: &str = "\
+Begin with: ntp run pipelines/quickstart.toml
+
+Words:
+  pipeline   a TOML file that says what to make; a study is one that names several
+  run        the folder of what a pipeline made
+  stage      a step of a pipeline: tasks, generate, convert, train, rollout, report
+  shard      a part of a stage's work, done and repeated by itself
+  task       a goal and the things that it is about; seen tasks may be trained on, unseen ones may not
+  episode    one attempt at a task, by the expert (a demonstration) or by a model (a rollout)
+  recording  episodes as they happened, in an MCAP file
+  dataset    episodes as Parquet tables: a LeRobotDataset v3.0 with program tables beside it
+  model      a trained network with its settings; its variant is the kind of network
+  suite      tasks and conditions in which models are tested, by the name that the pipeline gives it
+  decoder    how the part of a demonstration that a program may see is chosen from scores of its
+             frames: argmax takes the likeliest start and end, mss the likeliest part as a whole
+             (a maximum contiguous subsequence sum), am the likeliest start and the best end for it
+
 Results go to stdout, progress to stderr.
 Exit codes: 0 done; 1 failed, or a check failed; 2 wrong usage or pipeline file; \
 3 done, but something was left out; 130 interrupted (the same command carries on).";
@@ -29,42 +49,42 @@ Exit codes: 0 done; 1 failed, or a check failed; 2 wrong usage or pipeline file;
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run a pipeline: all stages, or those from --from to --to.
+    /// Run a pipeline: all its stages, or those from --from to --to.
     Run(RunArgs),
-    /// Draw or import tasks.
+    /// Draw the tasks, or import them, and divide them into seen and unseen.
     Tasks(TasksArgs),
-    /// Let the expert demonstrate the training tasks, recorded as MCAP.
+    /// Let the scripted expert demonstrate the seen tasks in physics; writes MCAP recordings.
     Generate(StageArgs),
-    /// Turn recordings into a LeRobotDataset with program tables.
+    /// Turn recordings into a dataset: a LeRobotDataset with program tables.
     Convert(StageArgs),
     /// Train models on the dataset.
     Train(StageArgs),
-    /// Let the models act the suites, closed loop in physics.
+    /// Let the trained models act the tasks of each suite in physics.
     Rollout(StageArgs),
-    /// Show results: one HTML page, JSON and CSV.
+    /// Put the results together: an HTML page, JSON and CSV; prints Markdown.
     Report(StageArgs),
-    /// Say what a file or folder is: recording, dataset, model, rollouts, run.
+    /// Say what a file or folder is, and how much is in it.
     Inspect(PathArgs),
-    /// Check the checksums and the content of a file or folder.
+    /// Check a file or folder: its checksums, and all that a reader relies on.
     Validate(PathArgs),
-    /// Show episodes in Rerun, rollouts beside their demonstrations, or simulate them again.
+    /// Show episodes in the Rerun viewer, or simulate them again and compare.
     Replay(ReplayArgs),
-    /// Draw an episode of a recording as a video, moving pictures or one picture.
+    /// Draw an episode as a video, a GIF or one picture.
     Render(RenderArgs),
-    /// Answer an SQL statement over the tables of a dataset, a run, rollouts or a model.
+    /// Answer an SQL statement about a dataset, a run, rollouts or a model.
     Query(QueryArgs),
-    /// Say where an episode, a frame or a model comes from.
+    /// Say where an episode, a frame or a model comes from: recording, settings, commit.
     Explain(ExplainArgs),
-    /// Write what can be verified of a broken dataset or recording.
+    /// Save what is whole of a broken dataset or recording.
     Repair(RepairArgs),
-    /// Make datasets of datasets, or compare two.
+    /// Merge, filter, split, compare, export and import datasets.
     #[command(subcommand)]
     Dataset(DatasetCommand),
-    /// Make a dataset ready for others: card, Croissant, checksums, under a named licence.
+    /// Make a dataset ready for others, with a card, metadata, checksums and a licence.
     Publish(PublishArgs),
-    /// Check a published copy against its SHA256SUMS.
+    /// Check a published copy against its checksums.
     Verify(VerifyArgs),
-    /// Print a completion script.
+    /// Print a script by which a shell completes commands.
     Completions {
         /// For which shell.
         shell: Shell,
@@ -77,19 +97,19 @@ pub struct StageArgs {
     /// The pipeline file, or a study that names several.
     #[arg(value_name = "PIPELINE.toml")]
     pub pipeline: PathBuf,
-    /// The run directory [default: data/runs/NAME].
+    /// The run's folder [default: data/runs/NAME, with the name that the pipeline has].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads [default: one a core]; never changes a byte.
+    /// How many threads [default: one a core]. Results are the same bytes with any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Only say what would be done and why.
+    /// Only say what would be done, and why.
     #[arg(long)]
     pub dry_run: bool,
     /// Do again what is up to date.
     #[arg(long)]
     pub force: bool,
-    /// Do this shard alone, in stages that have shards (generate, rollout).
+    /// Do this shard alone, in a stage that has shards: generate or rollout.
     #[arg(long, value_name = "I")]
     pub shard: Option<u32>,
     /// Print the result as JSON.
@@ -100,7 +120,7 @@ pub struct StageArgs {
 /// `ntp run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// As for one stage.
+    /// What all stages take.
     #[command(flatten)]
     pub stage: StageArgs,
     /// First stage: tasks, generate, convert, train, rollout or report.
@@ -117,13 +137,13 @@ pub struct TasksArgs {
     /// The pipeline file.
     #[arg(value_name = "PIPELINE.toml", required_unless_present = "import", conflicts_with = "import")]
     pub pipeline: Option<PathBuf>,
-    /// Import a task file of the authors' format, as tasks.json.
+    /// Read a task file in the format of the paper's authors, and write it as tasks.json.
     #[arg(long, value_name = "FILE")]
     pub import: Option<PathBuf>,
     /// With --import: how many of the first tasks may be trained on.
     #[arg(long, value_name = "N", default_value_t = 1000, requires = "import")]
     pub train: u32,
-    /// The run directory [default: data/runs/NAME]; with --import the file to write [default: none].
+    /// The run's folder [default: data/runs/NAME]. With --import: the file to write; without it none is written.
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Only say what would be done and why.
@@ -152,16 +172,16 @@ pub struct PathArgs {
 pub struct ReplayArgs {
     /// A recording (.mcap), a folder of recordings or rollouts, or a dataset.
     pub path: PathBuf,
-    /// Which episode, by its number; several with commas.
+    /// The episode's number; several with commas between them.
     #[arg(long, value_name = "K", value_delimiter = ',', required = true)]
     pub episode: Vec<u64>,
-    /// Write a Rerun file.
+    /// Write a file that `rerun FILE.rrd` opens.
     #[arg(long, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "verify"])]
     pub save: Option<PathBuf>,
     /// Open the Rerun viewer.
     #[arg(long, conflicts_with = "verify")]
     pub spawn: bool,
-    /// Simulate it again from its seed and compare every frame.
+    /// Simulate the episode again from its seed, and compare every frame.
     #[arg(long)]
     pub verify: bool,
     /// Print the result as JSON.
@@ -174,33 +194,39 @@ pub struct ReplayArgs {
 pub struct RenderArgs {
     /// A recording (.mcap), or a folder of recordings or rollouts.
     pub path: PathBuf,
-    /// Which episode, by its number.
+    /// The episode's number.
     #[arg(long, value_name = "K")]
     pub episode: u64,
-    /// From where: front, wrist, or a camera that the recording names.
+    /// The camera: front, wrist, or one that the recording names.
     #[arg(long, value_name = "NAME", default_value = "front")]
     pub camera: String,
-    /// As the recording's camera of that name filmed, with its size, quality and what was randomized; otherwise
-    /// pictures for people are drawn from its place.
+    /// Draw as the recording's camera filmed, with its size, its quality and what was randomised for it. Without this,
+    /// fine pictures for people are drawn from the camera's place.
     #[arg(long)]
     pub as_filmed: bool,
-    /// Width and height in pixels: one even number, or two as 640x480 [default: 480, or as filmed].
+    /// Width and height in pixels: one even number, or two as in 640x480 [default: 480, or as filmed].
     #[arg(long, value_name = "PIXELS")]
     pub size: Option<String>,
     /// Pictures a second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=60))]
     pub fps: u32,
-    /// With --png: which recorded frame [default: the last].
+    /// How many simulated seconds pass in a second.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed, conflicts_with = "png")]
+    pub speed: f32,
+    /// Show the running programs below, a lane for each depth.
+    #[arg(long, conflicts_with = "png")]
+    pub programs: bool,
+    /// With --png: the number of the recorded frame [default: the last].
     #[arg(long, value_name = "N", conflicts_with_all = ["mp4", "gif"])]
     pub frame: Option<usize>,
-    /// With --png: color, depth (16 bits of grey, in millimetres, 0 for nothing) or segments (8 bits of grey:
-    /// background 0, table 1, gripper 2, then the bodies).
+    /// With --png: color, depth or segments. Depths are 16 bits of grey, in millimetres, 0 where there is nothing.
+    /// Segments are 8 bits of grey: 0 the background, 1 the table, 2 the gripper, then the bodies.
     #[arg(long, value_name = "WHAT", default_value = "color", conflicts_with_all = ["mp4", "gif"])]
     pub show: Channel,
     /// Write a video.
     #[arg(long, value_name = "FILE", group = "output", required_unless_present_any = ["gif", "png"])]
     pub mp4: Option<PathBuf>,
-    /// Write moving pictures for pages.
+    /// Write a GIF, which pages show without a player.
     #[arg(long, value_name = "FILE", group = "output")]
     pub gif: Option<PathBuf>,
     /// Write one picture.
@@ -214,9 +240,9 @@ pub struct RenderArgs {
 /// `ntp query`.
 #[derive(Debug, Args)]
 pub struct QueryArgs {
-    /// A dataset, a run directory, rollouts or a model.
+    /// A dataset, a run's folder, rollouts or a model.
     pub path: PathBuf,
-    /// The statement; without one, the tables and their columns are listed.
+    /// The statement. Without one, tables and columns are listed.
     #[arg(value_name = "SELECT …")]
     pub sql: Option<String>,
     /// Print the rows as comma-separated values.
@@ -236,25 +262,25 @@ pub struct PublishArgs {
     /// The dataset.
     pub dataset: PathBuf,
     #[expect(clippy::doc_markdown, reason = "a help text")]
-    /// The folder to publish it into, or s3://BUCKET[/PREFIX]; the same command carries on what was interrupted.
+    /// The folder to publish it into, or s3://BUCKET[/PREFIX]. After an interruption, the same command carries on.
     #[arg(long, value_name = "DIR|URL")]
     pub to: Place,
-    /// Under which licence, by its name on the hub or at SPDX, e.g. cc-by-4.0; there is no default.
+    /// The licence, by its name at the Hugging Face hub or SPDX, such as cc-by-4.0. There is no default.
     #[arg(long, value_name = "ID")]
     pub license: License,
-    /// The day of publication; told, because no clock reaches a file.
+    /// The day of publication. It is asked for, because no clock reaches a file.
     #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Date,
-    /// What it is called [default: NTP demonstrations: FAMILIES].
+    /// The dataset's name [default: NTP demonstrations: FAMILIES].
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// Whose it is; may be given several times.
+    /// Whose it is. May be given several times.
     #[arg(long, value_name = "NAME")]
     pub creator: Vec<String>,
-    /// Where it will be found, e.g. its address at the Hugging Face hub.
+    /// Where it will be found, such as its address at the Hugging Face hub.
     #[arg(long, value_name = "URL")]
     pub url: Option<String>,
-    /// Which release it is.
+    /// The release's number.
     #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
     pub release: Release,
     /// Print the result as JSON.
@@ -279,13 +305,13 @@ pub struct VerifyArgs {
 pub struct ExplainArgs {
     /// A dataset, or a model.
     pub path: PathBuf,
-    /// Which episode of the dataset, by its number.
+    /// The number of an episode of the dataset.
     #[arg(long, value_name = "K")]
     pub episode: Option<u64>,
-    /// Which frame of the episode.
+    /// The number of a frame of the episode.
     #[arg(long, value_name = "F", requires = "episode")]
     pub frame: Option<u64>,
-    /// A folder in which recordings are looked for, besides `recordings` beside the dataset.
+    /// A folder with recordings, besides `recordings` beside the dataset. May be given several times.
     #[arg(long, value_name = "DIR")]
     pub recordings: Vec<PathBuf>,
     /// Print the result as JSON.
@@ -298,7 +324,7 @@ pub struct ExplainArgs {
 pub struct RepairArgs {
     /// A dataset, or a recording (.mcap).
     pub path: PathBuf,
-    /// What to write: a new folder or file.
+    /// The new folder or file.
     #[arg(long, value_name = "PATH")]
     pub to: PathBuf,
     /// Print the result as JSON.
@@ -309,17 +335,17 @@ pub struct RepairArgs {
 /// `ntp dataset`.
 #[derive(Debug, Subcommand)]
 pub enum DatasetCommand {
-    /// Write the episodes of several datasets into one, in order.
+    /// Write the episodes of several datasets into one, in the order given.
     Merge(MergeArgs),
-    /// Write the episodes of a dataset that are as asked for.
+    /// Write those episodes of a dataset that meet all conditions.
     Filter(FilterArgs),
     /// Write the parts of a dataset as datasets of their own.
     Split(SplitArgs),
     /// Say which episodes, calls and labels differ between two datasets; exit code 1 when any does.
     Diff(DiffArgs),
-    /// Write the labels in the shapes that others read.
+    /// Write the labels in a form that other programs read.
     Export(ExportArgs),
-    /// Bring in someone else's dataset whose frames are annotated by `subtask_index`.
+    /// Bring in a dataset from elsewhere, whose frames are annotated by `subtask_index`.
     Import(ImportArgs),
 }
 
@@ -341,11 +367,12 @@ pub struct ImportArgs {
 pub struct ExportArgs {
     /// The dataset.
     pub dataset: PathBuf,
-    /// In which shape: `subtask_index` (a `LeRobotDataset` without what is ours), language (the same with `LeRobot`'s
-    /// language columns), sarm (the same with SARM's columns), behavior (BEHAVIOR-1K's annotation files) or foxglove (`foxglove.Event` messages in an MCAP file).
+    /// The form. `subtask_index`: a `LeRobotDataset` without what is ours. language: the same with `LeRobot`'s language
+    /// columns. sarm: the same with SARM's columns. behavior: BEHAVIOR-1K's annotation files. foxglove:
+    /// `foxglove.Event` messages in an MCAP file.
     #[arg(long, value_name = "FORM")]
     pub labels: LabelForm,
-    /// The new folder, or with foxglove the new file.
+    /// The new folder; with foxglove, the new file.
     #[arg(long, value_name = "PATH")]
     pub to: PathBuf,
     /// Print the result as JSON.
@@ -367,7 +394,7 @@ pub struct MergeArgs {
     pub json: bool,
 }
 
-/// `ntp dataset filter`. Of an option that is given several times, one value is enough; all options must hold.
+/// `ntp dataset filter`. An option that is given several times holds when one of its values does; all options must hold.
 #[derive(Debug, Args)]
 pub struct FilterArgs {
     /// The dataset.
@@ -375,25 +402,25 @@ pub struct FilterArgs {
     /// The new folder.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
-    /// A task, by its id or its text.
+    /// The task, by its id or its text.
     #[arg(long, value_name = "TASK")]
     pub task: Vec<String>,
-    /// A family of tasks.
+    /// The family of the task, such as `block_stacking`.
     #[arg(long, value_name = "FAMILY")]
     pub family: Vec<Family>,
-    /// A program that is called.
+    /// A program that the episode calls.
     #[arg(long, value_name = "PROGRAM")]
     pub program: Vec<String>,
-    /// How it ended: success, failure, or a cause of failure.
+    /// How the episode ended: success, failure, or a cause of failure.
     #[arg(long, value_name = "OUTCOME")]
     pub outcome: Vec<Ending>,
-    /// Seen or unseen.
+    /// Whether the task is seen or unseen.
     #[arg(long, value_name = "SPLIT")]
     pub split: Option<Split>,
-    /// Least number of frames.
+    /// The least number of frames.
     #[arg(long, value_name = "N")]
     pub min_frames: Option<u64>,
-    /// Greatest number of frames.
+    /// The greatest number of frames.
     #[arg(long, value_name = "N")]
     pub max_frames: Option<u64>,
     /// Print the result as JSON.
@@ -410,16 +437,16 @@ pub struct SplitArgs {
     /// The new folder, with a dataset for each part.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
-    /// A part for each value: split, task, family or outcome.
+    /// Make a part for each value of: split, task, family or outcome.
     #[arg(long, value_name = "WHAT", value_parser = ["split", "task", "family", "outcome"])]
     pub by: Option<String>,
-    /// Parts drawn at random, e.g. train=0.8,val=0.2.
+    /// Draw parts at random, such as train=0.8,val=0.2.
     #[arg(long, value_name = "NAME=SHARE,…", value_delimiter = ',')]
     pub shares: Vec<String>,
-    /// With --shares, what stays together: task (no task is in two parts) or episode.
+    /// With --shares: what stays together, task or episode. With task, no task is in two parts.
     #[arg(long, value_name = "WHAT", value_parser = ["task", "episode"], default_value = "task")]
     pub unit: String,
-    /// With --shares, the seed of the draw.
+    /// With --shares: the seed of the draw.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Print the result as JSON.
@@ -437,4 +464,10 @@ pub struct DiffArgs {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// A speed that shows something: above 0, and not faster than a thousand times.
+fn speed(text: &str) -> Result<f32, String> {
+    let speed: f32 = text.parse().map_err(|_error| format!("{text:?} is no number"))?;
+    if speed > 0.0 && speed <= 1000.0 { Ok(speed) } else { Err("allowed: above 0, up to 1000".to_owned()) }
 }

@@ -80,6 +80,20 @@ impl Program {
         }
     }
 
+    /// The colour in which viewers and pictures show its calls.
+    pub fn color(self) -> [u8; 3] {
+        match self {
+            Self::None => [120, 120, 120],
+            Self::PickAndPlace | Self::PickAndDrop => [126, 87, 194],
+            Self::Pick => [38, 150, 140],
+            Self::Place | Self::Drop => [205, 133, 63],
+            Self::MoveTo => [79, 165, 235],
+            Self::Grip => [92, 170, 96],
+            Self::Release => [214, 84, 120],
+            _root => [84, 110, 168],
+        }
+    }
+
     /// Row in the program memory.
     pub fn index(self) -> usize {
         self as usize

@@ -12,6 +12,7 @@ mod call;
 mod episode;
 mod frame;
 mod instruction;
+mod lanes;
 mod observation_rows;
 mod outcome;
 mod push;
@@ -27,6 +28,7 @@ pub use frame::{Frame, GripperState, Observation};
 pub use instruction::{
     Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
 };
+pub use lanes::calls_by_depth;
 pub use observation_rows::{ObservationRow, ObservationRowMut, ObservationRows};
 pub use outcome::{Cause, Outcome};
 pub use push::Push;

@@ -3,6 +3,7 @@
 //! # Input and output
 //!
 //! RGB bytes, row by row, and a codec's bytes. [`Film`] draws an episode's frames with a camera and encodes them.
+//! [`write_mp4`] and [`write_gif`] make clips for people, with the running programs below where [`ClipConfig`] asks.
 //!
 //! # Invariants
 //!
@@ -16,11 +17,12 @@ mod film;
 mod gif;
 mod h264;
 mod jpeg;
+mod lanes;
 mod mp4;
 mod png;
 mod seek;
 
-pub use clip::{write_gif, write_mp4, write_png};
+pub use clip::{Clip, ClipConfig, write_gif, write_mp4, write_png};
 pub use error::VideoError;
 pub use film::Film;
 pub use gif::encode_gif;

@@ -7,7 +7,7 @@ use crate::cli::RenderArgs;
 use crate::commands::replay::{self, Found};
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::render::{CameraConfig, PictureQuality, Viewpoint};
-use crate::video::{write_gif, write_mp4, write_png};
+use crate::video::{Clip, ClipConfig, write_gif, write_mp4, write_png};
 
 /// Width and height of pictures for people.
 const SIZE_PX: [u32; 2] = [480, 480];
@@ -15,26 +15,27 @@ const SIZE_PX: [u32; 2] = [480, 480];
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<CommandOutcome> {
     let found = replay::find(&args.path, &[args.episode])?.into_iter().next().context("an episode that was found")?;
     let (camera, Found { file, episode, .. }) = (camera(args, &found.cameras)?, found);
-    let (written, n_pictures) = match (&args.mp4, &args.gif, &args.png) {
-        (Some(path), _, _) => (path, write_mp4(path, &episode, &camera, args.fps)?),
-        (None, Some(path), _) => (path, write_gif(path, &episode, &camera, args.fps)?),
+    let clip = ClipConfig { fps: args.fps, speed: args.speed, programs: args.programs };
+    let (written, made) = match (&args.mp4, &args.gif, &args.png) {
+        (Some(path), _, _) => (path, write_mp4(path, &episode, &camera, &clip)?),
+        (None, Some(path), _) => (path, write_gif(path, &episode, &camera, &clip)?),
         (None, None, Some(path)) => {
             let position = args.frame.unwrap_or(episode.frames.len() - 1);
             let frame = episode.frames.get(position).ok_or_else(|| {
                 UsageError(format!("--frame {position}: the episode has frames 0 to {}", episode.frames.len() - 1))
             })?;
             write_png(path, &episode, &camera, frame, args.show)?;
-            (path, 1)
+            (path, Clip { size_px: camera.size_px, n_pictures: 1 })
         }
         (None, None, None) => return Err(UsageError("render needs one of --mp4, --gif, --png".to_owned()).into()),
     };
-    let [width, height] = camera.size_px;
+    let Clip { size_px: [width, height], n_pictures } = made;
     if args.json {
         output::print_json(&json!({
             "recording": file,
             "episode": args.episode,
             "camera": camera.name,
-            "size_px": camera.size_px,
+            "size_px": made.size_px,
             "pictures": n_pictures,
             "written": written,
         }))?;

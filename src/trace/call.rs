@@ -1,7 +1,7 @@
 //! One program call: who called what, on which part of the specification, when, and whether the caller ended with it.
 
 use crate::program::Program;
-use crate::scene::SlotIndex;
+use crate::scene::{Scene, SlotIndex};
 use crate::trace::Span;
 
 /// Position of a call in its episode, in the order of calling (a caller before its callees).
@@ -36,6 +36,23 @@ pub struct ProgramCall {
     pub end_of_program: bool,
     /// What a learned policy thought; `None` for an expert.
     pub prediction: Option<Prediction>,
+}
+
+impl ProgramCall {
+    /// What is called, in words: `move_to(block_D)`.
+    pub fn label(&self, scene: &Scene) -> String {
+        match self.argument {
+            Some(slot) => format!("{}({})", self.program, scene.slot(slot).name),
+            None => self.program.to_string(),
+        }
+    }
+
+    /// The colour in which it is shown: that of the first body that its argument may show, else that of its program.
+    pub fn color(&self, scene: &Scene) -> [u8; 3] {
+        let argument = self.argument.map(|slot| scene.slot(slot));
+        let body = argument.and_then(|slot| slot.bodies.first());
+        body.map_or_else(|| self.program.color(), |&body| scene.body(body).color)
+    }
 }
 
 /// Probabilities behind a learned policy's choice of a call.

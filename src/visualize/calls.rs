@@ -5,7 +5,7 @@ use rerun::{Color, TextLog};
 
 use crate::trace::{CallId, Episode, Outcome, ProgramCall, Push};
 use crate::visualize::store::Store;
-use crate::visualize::{Replay, VisualizeError, agreement, clock, lanes, palette};
+use crate::visualize::{Replay, VisualizeError, agreement, clock, palette};
 
 /// A line of the log.
 struct Line {
@@ -41,7 +41,7 @@ fn line_of_call(replay: &Replay<'_>, call: &ProgramCall) -> Line {
             color: palette::color(palette::STOP),
         },
         None => {
-            let color = palette::color(palette::of_call(&episode.scene, call));
+            let color = palette::color(call.color(&episode.scene));
             Line { frame, text: path, level: TextLogLevel::INFO, color }
         }
     }
@@ -66,11 +66,11 @@ fn line_of_outcome(episode: &Episode) -> Line {
 
 /// The stack from the root's callee to a call: `pick_and_place › pick › move_to(block_D)`.
 fn path_in_words(episode: &Episode, call: &ProgramCall) -> String {
-    let mut words = vec![lanes::label(&episode.scene, call)];
+    let mut words = vec![call.label(&episode.scene)];
     let mut caller = call.caller;
     while let Some(CallId(id)) = caller.filter(|id| id.0 > 0) {
         let running = &episode.calls[id as usize];
-        words.push(lanes::label(&episode.scene, running));
+        words.push(running.label(&episode.scene));
         caller = running.caller;
     }
     words.reverse();

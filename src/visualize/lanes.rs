@@ -6,31 +6,13 @@ use std::ops::Range;
 use rerun::external::re_log_types::EntityPath;
 use rerun::{StateChange, StateConfiguration};
 
-use crate::program::Program;
 use crate::scene::Scene;
-use crate::trace::{Episode, Frame, ProgramCall};
+use crate::trace::{Episode, Frame, ProgramCall, calls_by_depth};
 use crate::visualize::store::Store;
 use crate::visualize::{VisualizeError, clock, palette};
 
 /// What is left of the colour of every other call, so that neighbours can be told apart.
 const ODD_SHADE: f32 = 0.82;
-
-/// What is called, in words: `move_to(block_D)`.
-pub(super) fn label(scene: &Scene, call: &ProgramCall) -> String {
-    match call.argument {
-        Some(slot) => format!("{}({})", call.program, scene.slot(slot).name),
-        None => call.program.to_string(),
-    }
-}
-
-/// The calls that take time, by depth. A step that only ends its program does not.
-pub(super) fn calls_by_depth(episode: &Episode) -> BTreeMap<u8, Vec<&ProgramCall>> {
-    let mut by_depth: BTreeMap<u8, Vec<&ProgramCall>> = BTreeMap::new();
-    for call in episode.calls.iter().filter(|call| call.program != Program::None) {
-        by_depth.entry(call.depth).or_default().push(call);
-    }
-    by_depth
-}
 
 /// At which frames which of the calls (of one depth, in order) begins to run; `None` where none runs any longer. A
 /// call lasts until the frame of its return, or until the frame after when it returned at once.
@@ -78,17 +60,17 @@ pub(super) fn put(store: &mut Store, root: &str, episode: &Episode) -> Result<()
 
 /// A lane's state while a call runs. It holds the call's id, since Rerun would draw two equal states as one.
 fn state(scene: &Scene, call: &ProgramCall) -> String {
-    format!("{} #{}", label(scene, call), call.id.0)
+    format!("{} #{}", call.label(scene), call.id.0)
 }
 
 /// What is shown for the states: labels without ids, and neighbours of one colour in two shades.
 fn configuration(scene: &Scene, calls: &[&ProgramCall]) -> StateConfiguration {
     let shade = |(position, call): (usize, &&ProgramCall)| {
         let share = if position % 2 == 0 { 1.0 } else { ODD_SHADE };
-        palette::dimmed(palette::of_call(scene, call), share)
+        palette::dimmed(call.color(scene), share)
     };
     StateConfiguration::new()
         .with_values(calls.iter().map(|call| state(scene, call)))
-        .with_labels(calls.iter().map(|call| label(scene, call)))
+        .with_labels(calls.iter().map(|call| call.label(scene)))
         .with_colors(calls.iter().enumerate().map(shade))
 }

@@ -4,8 +4,6 @@ use rerun::Color;
 use sha2::{Digest as _, Sha256};
 
 use crate::program::Program;
-use crate::scene::Scene;
-use crate::trace::ProgramCall;
 
 /// Behind the scene.
 pub(super) const SKY: [u8; 3] = [28, 32, 38];
@@ -47,32 +45,10 @@ pub(super) fn dimmed(color: [u8; 3], share: f32) -> Color {
     Color::from_rgb(red, green, blue)
 }
 
-/// The colour of a call: that of its program, or of the body that its argument shows when that is always the same.
-pub(super) fn of_call(scene: &Scene, call: &ProgramCall) -> [u8; 3] {
-    let argument = call.argument.map(|slot| scene.slot(slot));
-    match argument.and_then(|slot| slot.bodies.first()) {
-        Some(&body) => scene.body(body).color,
-        None => of_program(call.program),
-    }
-}
-
-fn of_program(program: Program) -> [u8; 3] {
-    match program {
-        Program::None => [120, 120, 120],
-        Program::PickAndPlace | Program::PickAndDrop => [126, 87, 194],
-        Program::Pick => [38, 150, 140],
-        Program::Place | Program::Drop => [205, 133, 63],
-        Program::MoveTo => [79, 165, 235],
-        Program::Grip => [92, 170, 96],
-        Program::Release => [214, 84, 120],
-        _root => [84, 110, 168],
-    }
-}
-
 /// The colour of a program of any vocabulary, by its name.
 pub(super) fn of_name(name: &str) -> [u8; 3] {
     if let Ok(program) = name.parse::<Program>() {
-        return of_program(program);
+        return program.color();
     }
     let digest = Sha256::digest(name.as_bytes());
     OTHERS[usize::from(digest[0]) % OTHERS.len()]

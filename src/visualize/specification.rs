@@ -10,7 +10,7 @@
 use rerun::{LineStrip2D, LineStrips2D, Points2D};
 
 use crate::program::Program;
-use crate::trace::{Episode, ProgramCall, Span};
+use crate::trace::{Episode, ProgramCall, Span, calls_by_depth};
 use crate::visualize::store::Store;
 use crate::visualize::{VisualizeError, clock, lanes, palette};
 
@@ -38,7 +38,7 @@ pub(super) fn put(store: &mut Store, episode: &Episode, specification: Option<&E
     if let Some(specification) = specification {
         put_demonstration(store, strip, specification)?;
     }
-    for (depth, calls) in lanes::calls_by_depth(episode) {
+    for (depth, calls) in calls_by_depth(episode) {
         let events = lanes::events(&episode.frames, calls);
         put_scopes(store, strip, depth, &Running { episode, spans, events: &events })?;
         put_probabilities(store, strip, depth, &Running { episode, spans, events: &events })?;
@@ -121,7 +121,7 @@ fn put_demonstration(store: &mut Store, strip: Strip, demonstration: &Episode) -
     let calls: Vec<&ProgramCall> = demonstration.calls.iter().filter(|call| call.program != Program::None).collect();
     let bars = strip
         .bars(calls.iter().map(|call| (call.frames, call.depth)))
-        .with_colors(calls.iter().map(|call| palette::dimmed(palette::of_call(&demonstration.scene, call), BEHIND)))
+        .with_colors(calls.iter().map(|call| palette::dimmed(call.color(&demonstration.scene), BEHIND)))
         .with_draw_order(1.0);
     store.put_static("specification/demonstration", &bars)
 }
@@ -137,7 +137,7 @@ fn put_scopes(store: &mut Store, strip: Strip, depth: u8, running: &Running<'_>)
     let shown: Vec<(Span, &ProgramCall)> = scoped.into_iter().flatten().collect();
     let bars = strip
         .bars(shown.iter().map(|&(span, _)| (span, depth)))
-        .with_colors(shown.iter().map(|(_, call)| palette::color(palette::of_call(scene, call))));
+        .with_colors(shown.iter().map(|(_, call)| palette::color(call.color(scene))));
     store.put_ragged_rows(path.as_str(), running.times(), &bars, &lengths)?;
     put_names(store, depth, running)
 }
@@ -152,8 +152,8 @@ fn put_names(store: &mut Store, depth: u8, running: &Running<'_>) -> Result<(), 
     let scene = &running.episode.scene;
     let calls: Vec<&ProgramCall> = shown.into_iter().flatten().collect();
     let points = Points2D::new(calls.iter().map(|_| [-MARGIN / 2.0, Strip::y(depth) - NAME_RISE]))
-        .with_labels(calls.iter().map(|call| lanes::label(scene, call)))
-        .with_colors(calls.iter().map(|call| palette::color(palette::of_call(scene, call))));
+        .with_labels(calls.iter().map(|call| call.label(scene)))
+        .with_colors(calls.iter().map(|call| palette::color(call.color(scene))));
     store.put_ragged_rows(path.as_str(), running.times(), &points, &lengths)
 }
 

@@ -1,11 +1,12 @@
 //! Pictures come back from PNG, H.264 and MP4, and what is damaged is named.
 
+use image::AnimationDecoder as _;
 use ntp::render::{CameraConfig, Channel, PictureFormat, Segment, Viewpoint};
 use ntp::task::Split;
 use ntp::trace::Episode;
 use ntp::video::{
-    Film, H264Decoder, H264Encoder, Mp4Reader, Mp4Writer, Rgb, decode_png, encode_png, is_key_frame, write_gif,
-    write_mp4, write_png,
+    ClipConfig, Film, H264Decoder, H264Encoder, Mp4Reader, Mp4Writer, Rgb, decode_png, encode_gif, encode_png,
+    is_key_frame, write_gif, write_mp4, write_png,
 };
 
 use crate::kinematic::{demonstration, tower, trial};
@@ -116,7 +117,13 @@ fn mp4_gives_back_every_packet_at_its_time() {
 fn a_damaged_mp4_is_an_error_that_names_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("clip.mp4");
-    write_mp4(&path, &episode(), &CameraConfig::new(Viewpoint::Wrist, SIZE), 5).unwrap();
+    write_mp4(
+        &path,
+        &episode(),
+        &CameraConfig::new(Viewpoint::Wrist, SIZE),
+        &ClipConfig { fps: 5, ..ClipConfig::default() },
+    )
+    .unwrap();
     let bytes = std::fs::read(&path).unwrap();
     for len in [0, 7, 40, bytes.len() / 2, bytes.len() - 3] {
         std::fs::write(&path, &bytes[..len]).unwrap();
@@ -132,13 +139,83 @@ fn clips_are_written_in_each_form() {
     let end_secs = episode.frames.last().unwrap().time_nanos as f64 / 1e9;
     let camera = CameraConfig { format: PictureFormat::H264, ..CameraConfig::new(Viewpoint::Front, SIZE) };
     let [mp4, gif, png] = ["a.mp4", "a.gif", "a.png"].map(|name| folder.path().join(name));
-    let n_pictures = write_mp4(&mp4, &episode, &camera, 4).unwrap();
-    assert_eq!(n_pictures, (end_secs * 4.0).ceil() as u64 + 1);
-    assert_eq!(Mp4Reader::open(&mp4).unwrap().samples().len() as u64, n_pictures);
-    assert_eq!(write_gif(&gif, &episode, &camera, 4).unwrap(), n_pictures);
+    let clip = ClipConfig { fps: 4, ..ClipConfig::default() };
+    let made = write_mp4(&mp4, &episode, &camera, &clip).unwrap();
+    assert_eq!((made.size_px, made.n_pictures), (SIZE, (end_secs * 4.0).ceil() as u64 + 1));
+    assert_eq!(Mp4Reader::open(&mp4).unwrap().samples().len() as u64, made.n_pictures);
+    assert_eq!(write_gif(&gif, &episode, &camera, &clip).unwrap(), made);
     assert!(std::fs::read(&gif).unwrap().starts_with(b"GIF89a"));
     write_png(&png, &episode, &camera, &episode.frames[0], Channel::Color).unwrap();
     assert_eq!(decode_png(&std::fs::read(&png).unwrap()).unwrap().size_px, SIZE);
+}
+
+/// What a viewer shows of a GIF: pictures with the hundredths of a second for which each stays.
+fn shown(gif: &[u8]) -> Vec<(Rgb, u32)> {
+    let decoder = image::codecs::gif::GifDecoder::new(std::io::Cursor::new(gif)).unwrap();
+    let frame = |frame: image::ImageResult<image::Frame>| {
+        let frame = frame.unwrap();
+        let (millis, parts) = frame.delay().numer_denom_ms();
+        let picture = image::DynamicImage::from(frame.into_buffer()).into_rgb8();
+        (Rgb { size_px: picture.dimensions().into(), bytes: picture.into_raw() }, millis / parts / 10)
+    };
+    decoder.into_frames().map(frame).collect()
+}
+
+#[test]
+fn a_gif_writes_what_changes_and_shows_every_picture_for_its_time() {
+    let dark = |bright: &[usize]| {
+        let bytes = (0..4 * 2 * 3).map(|at| if bright.contains(&(at / 3)) { 250 } else { 10 }).collect();
+        Rgb { size_px: [4, 2], bytes }
+    };
+    let pictures = [dark(&[]), dark(&[]), dark(&[5, 6]), dark(&[6]), dark(&[6])];
+    let gif = encode_gif(pictures.clone().into_iter(), 10).unwrap();
+    let expected = [(pictures[0].clone(), 20), (pictures[2].clone(), 10), (pictures[3].clone(), 20)];
+    assert_eq!(shown(&gif), expected);
+    let other_size = Rgb { size_px: [2, 2], bytes: vec![0; 12] };
+    assert!(encode_gif([dark(&[]), other_size].into_iter(), 10).is_err());
+    assert!(encode_gif([Rgb { size_px: [4, 2], bytes: vec![0; 5] }].into_iter(), 10).is_err());
+    assert!(encode_gif(std::iter::empty(), 10).is_err());
+}
+
+#[test]
+fn a_gif_of_an_episode_stays_close_to_its_pictures() {
+    let pictures = pictures();
+    let shown = shown(&encode_gif(pictures.iter().cloned(), 10).unwrap());
+    let (mut number, mut left) = (0, 0);
+    for picture in &pictures {
+        if left == 0 {
+            left = shown[number].1;
+            number += 1;
+        }
+        assert!(mean_difference(picture, &shown[number - 1].0) < 4.0);
+        left -= 10;
+    }
+    assert_eq!((number, left), (shown.len(), 0));
+}
+
+#[test]
+fn running_programs_stand_below_the_picture_in_their_colours_and_none_before_it_is_called() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("programs.gif");
+    let episode = episode();
+    let camera = CameraConfig::new(Viewpoint::Front, [320, 240]);
+    let clip = ClipConfig { programs: true, speed: 2.0, ..ClipConfig::default() };
+    let made = write_gif(&path, &episode, &camera, &clip).unwrap();
+    // Four depths (task, sub-task, pick or place, primitive) of 20 pixels, and twice a margin of 6.
+    assert_eq!(made.size_px, [320, 240 + 4 * 20 + 12]);
+    let end_secs = episode.frames.last().unwrap().time_nanos as f64 / 1e9;
+    assert_eq!(made.n_pictures, (end_secs * 10.0 / 2.0).ceil() as u64 + 1);
+    let shown = shown(&std::fs::read(&path).unwrap());
+    let near = |picture: &Rgb, column: usize, row: usize, color: [u8; 3]| {
+        let at = 3 * (row * 320 + column);
+        picture.bytes[at..at + 3].iter().zip(color).all(|(found, asked)| found.abs_diff(asked) < 16)
+    };
+    let (first, last) = (&shown[0].0, &shown[shown.len() - 1].0);
+    let middle_of_root = 240 + 6 + 10;
+    let root = ntp::program::Program::BlockStacking.color();
+    assert!(near(last, 300, middle_of_root, root) && !near(first, 300, middle_of_root, root));
+    let is_text = |picture: &Rgb| (0..160).any(|column| near(picture, column, middle_of_root, [225, 229, 235]));
+    assert!(is_text(first), "the running program is not named");
 }
 
 #[test]
