@@ -21,13 +21,15 @@
 //!
 //! # Invariants
 //!
-//! Nothing is written but the answer. Only the columns that a statement names are read.
+//! Nothing is written but the answer. Only the columns that a statement names are read, and a part of the rows at a
+//! time: groups and sums need memory for themselves alone. An answer is the same with any number of threads: where a
+//! statement asks for no order and groups, joins or makes distinct, rows are sorted by their columns.
 
 mod answer;
 mod error;
 mod tables;
 
-use polars::prelude::LazyFrame;
+use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsResult, SortMultipleOptions};
 use polars::sql::SQLContext;
 
 use crate::table::catch_panic;
@@ -48,8 +50,30 @@ pub fn query(tables: &Tables, sql: &str) -> Result<Answer, QueryError> {
         for (name, frame) in frames {
             context.register(name, frame);
         }
-        context.execute(sql).and_then(LazyFrame::collect)
+        let rows = collect(context.execute(sql)?)?;
+        if has_order(sql) { Ok(rows) } else { sorted(rows) }
     };
     let answer = catch_panic(execute).map_err(|words| QueryError::Panic { words })?;
     answer.map(Answer::new).map_err(|source| QueryError::Refused { source, tables: tables.names() })
+}
+
+/// The rows, by the engine that goes through files a part at a time. A statement has one result.
+fn collect(frame: LazyFrame) -> PolarsResult<DataFrame> {
+    Ok(frame.collect_with_engine(Engine::Streaming)?.unwrap_single())
+}
+
+/// Whether the order of the answer's rows is asked for, or that of the files.
+fn has_order(sql: &str) -> bool {
+    let sql = sql.to_lowercase();
+    let words: Vec<&str> = sql.split(|letter: char| !letter.is_alphanumeric() && letter != '_').collect();
+    let is_mixed =
+        words.iter().any(|word| ["group", "distinct", "join", "union", "intersect", "except"].contains(word));
+    !is_mixed || words.contains(&"order") || words.contains(&"limit")
+}
+
+/// Sorted by all columns that have an order.
+fn sorted(rows: DataFrame) -> PolarsResult<DataFrame> {
+    let columns = rows.columns().iter().filter(|column| !column.dtype().is_nested());
+    let names: Vec<String> = columns.map(|column| column.name().to_string()).collect();
+    if names.is_empty() { Ok(rows) } else { rows.sort(names, SortMultipleOptions::default().with_nulls_last(true)) }
 }

@@ -74,6 +74,20 @@ fn text_csv_and_parquet_hold_the_same_rows() {
 }
 
 #[test]
+fn groups_come_in_an_order_of_their_own_where_none_is_asked_for() {
+    let (_folder, tables) = small_dataset();
+    let programs = |sql: &str| -> Vec<String> {
+        rows(&tables, sql).iter().map(|row| row["program"].as_str().unwrap().to_owned()).collect()
+    };
+    let found = programs("SELECT program, COUNT(*) AS calls FROM calls GROUP BY program");
+    assert!(found.len() > 4 && found.is_sorted(), "{found:?}");
+    let found = programs("SELECT DISTINCT program FROM calls");
+    assert!(found.is_sorted(), "{found:?}");
+    let found = programs("SELECT program FROM calls WHERE episode_index = 0");
+    assert_eq!(found[..3], ["block_stacking", "pick_and_place", "pick"]);
+}
+
+#[test]
 fn floats_are_printed_as_short_as_they_were_meant() {
     let (_folder, tables) = small_dataset();
     let found = rows(&tables, "SELECT timestamp FROM frames WHERE frame_index = 1 LIMIT 1");
