@@ -32,7 +32,7 @@ Words:
   run        the folder of what a pipeline made
   stage      a step of a pipeline: tasks, generate, convert, train, rollout, report
   shard      a part of a stage's work, done and repeated by itself
-  task       a goal and the things that it is about; seen tasks may be trained on, unseen ones may not
+  task       a goal and the things that it is about; training may use seen tasks, not unseen ones
   episode    one attempt at a task, by the expert (a demonstration) or by a model (a rollout)
   recording  episodes as they happened, in an MCAP file
   dataset    episodes as Parquet tables: a LeRobotDataset v3.0 with program tables beside it

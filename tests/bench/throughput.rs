@@ -57,15 +57,24 @@ fn main() {
     if wanted("generate_sorting_40") {
         bench.generate_sorting_40();
     }
-    let later =
-        ["generate_stacking", "convert_rows", "convert_peak_mb", "train_samples", "policy_step_us", "rollout_stacking"];
-    if later.into_iter().any(wanted) {
+    let of_policies = ["train_samples", "policy_step_us", "rollout_stacking"];
+    let of_dataset = [&["convert_rows", "convert_peak_mb", "train_samples_paper"][..], &of_policies].concat();
+    let is_dataset_wanted = of_dataset.into_iter().any(wanted);
+    if is_dataset_wanted || wanted("generate_stacking") {
         bench.generate_stacking();
     }
-    if later[1..].iter().any(|name| wanted(name)) {
-        let trials = bench.convert_rows();
+    if !is_dataset_wanted {
+        return;
+    }
+    let trials = bench.convert_rows();
+    if wanted("convert_peak_mb") {
         bench.convert_peak_mb();
-        bench.train_samples(&trials);
+    }
+    if wanted("train_samples_paper") {
+        bench.train_samples("train_samples_paper", Variant::NTP_PAPER, &trials);
+    }
+    if of_policies.into_iter().any(wanted) {
+        bench.train_samples("train_samples", Variant::NTP, &trials);
         bench.policies();
     }
 }
@@ -81,7 +90,7 @@ fn cpu_secs<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (value, start.elapsed().as_secs_f64())
 }
 
-/// The paper's seven convolutions there and back over 32 pictures of 64 pixels, as `tests/bench/convolutions.py` does in
+/// The paper's seven convolutions there and back over 32 pictures of 64 pixels, as `tests/bench/peers/pytorch_convolutions.py` does in
 /// `PyTorch`.
 fn train_convolutions() {
     const STEPS: usize = 30;
@@ -249,18 +258,18 @@ impl Bench {
     }
 
     /// Decisions learned from in training, batch building included.
-    fn train_samples(&self, trials: &DatasetTrials) {
+    fn train_samples(&self, name: &str, variant: Variant, trials: &DatasetTrials) {
         let config = TrainConfig { steps: Some(60), checkpoint_every: 1000, ..TrainConfig::default() };
-        let training = Training { variant: Variant::NTP, specification: SpecificationForm::default(), seed: 0, config };
+        let training = Training { variant, specification: SpecificationForm::default(), seed: 0, config };
         let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
-        let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join("model"), &mut hooks));
+        let (summary, secs) = cpu_secs(|| train(&training, trials, &self.folder.join(variant.name()), &mut hooks));
         let summary = summary.expect("training goes well");
-        report("train_samples", summary.examples as f64 / secs, "decisions per CPU-second");
+        report(name, summary.examples as f64 / secs, "decisions per CPU-second");
     }
 
     /// One decision at a time on a 25-frame demonstration, and whole rollouts in physics by the same untrained model.
     fn policies(&self) {
-        let folder = self.folder.join("model");
+        let folder = self.folder.join(Variant::NTP.name());
         let tasks = stacking_tasks();
         let longest = tasks.tasks.iter().find(|task| task.goals.len() == 6);
         let task = longest.or(tasks.tasks.first()).expect("there are tasks");

@@ -1,6 +1,6 @@
 """The paper's seven convolutions there and back in PyTorch, beside `train_convolutions_64` of `cargo bench`.
 
-python tests/bench/convolutions.py      # pip install torch
+Needs: pip install torch
 """
 
 import json
@@ -28,4 +28,4 @@ step()
 begin = time.process_time()
 for _ in range(STEPS):
     step()
-print(json.dumps({"name": "train_convolutions_64", "value": STEPS * BATCH / (time.process_time() - begin)}))
+print(json.dumps({"peer": f"PyTorch {torch.__version__}", "value": STEPS * BATCH / (time.process_time() - begin)}))
