@@ -21,6 +21,8 @@ mod dataset_pictures;
 #[cfg(test)]
 mod detecting;
 #[cfg(test)]
+mod documents;
+#[cfg(test)]
 mod expert;
 #[cfg(test)]
 mod export;

@@ -1,4 +1,4 @@
-//! The tutorial, followed word by word in an empty directory, and what the README shows of a run.
+//! The tutorial, followed word by word in an empty directory.
 
 use std::path::Path;
 use std::process::Command;
@@ -29,15 +29,4 @@ fn every_command_of_the_tutorial_does_what_it_says_in_an_empty_directory() {
     for made in ["demonstrations.rrd", "rollout.rrd", "towers/croissant.json", "run/report/index.html"] {
         assert!(folder.path().join(made).is_file(), "{made} is not there");
     }
-}
-
-#[test]
-fn the_readmes_tables_are_those_that_a_run_printed() {
-    let text = |path: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
-    let (page, printed) = (text("README.md"), text("docs/results/paper.md"));
-    let (_, shown) = page.split_once("<!-- of docs/results/paper.md -->\n\n").unwrap();
-    let tables = |text: &str| text.split("\n\n").filter(|part| part.starts_with("| model ")).count();
-    let shown: Vec<&str> = shown.split("\n\n").take(3).collect();
-    assert_eq!(tables(&printed), shown.len());
-    assert!(shown.iter().all(|table| printed.contains(&format!("\n\n{table}\n"))), "another table than the run's");
 }
