@@ -100,7 +100,7 @@ fn all_cores() -> usize {
 pub(super) fn line(report: &StageReport) -> String {
     let what = match report.status {
         Status::UpToDate => "up to date".to_owned(),
-        Status::Done => format!("done ({})", report.reason),
+        Status::Done => format!("done (before: {})", report.reason),
         Status::Needed => format!("to do: {}", report.reason),
     };
     let episodes = match (report.episodes, report.failed) {
