@@ -65,7 +65,7 @@ fn encode_prediction(prediction: &Prediction) -> proto::Prediction {
 }
 
 pub(super) fn encode_return(call: &ProgramCall) -> proto::ProgramReturn {
-    proto::ProgramReturn { call: call.id.0, program: program_to_proto(call.program).into(), frame: call.frames.last() }
+    proto::ProgramReturn { call: call.id.0, program: program_to_proto(call.program), frame: call.frames.last() }
 }
 
 /// A call that has not returned yet: its span of frames is empty, at the frame of the call.

@@ -26,7 +26,7 @@ pub(super) fn mesh(body: &Body, rgb: [u8; 3], letters: Letters) -> Mesh {
         }
         Shape::Cylinder { radius_m, half_height_m } if kind == "peg" => peg(&mut mesh, radius_m, half_height_m, color),
         Shape::Cylinder { radius_m, half_height_m } if kind == "gear" => {
-            gear(&mut mesh, radius_m, half_height_m, color)
+            gear(&mut mesh, radius_m, half_height_m, color);
         }
         Shape::Cylinder { radius_m, half_height_m } => can(&mut mesh, radius_m, half_height_m, color),
         Shape::Ball { radius_m } => mesh.ball(radius_m, N_SIDES, Paint { color, gloss: 0.5 }),
