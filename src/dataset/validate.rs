@@ -19,7 +19,8 @@ use crate::dataset::tables::calls::check::{ArgumentBatch, check_arguments, check
 use crate::dataset::tables::calls::read::{CallBatch, read_calls};
 use crate::dataset::tables::episodes::check::EpisodeCheck;
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
-use crate::dataset::tables::frames::check::{FrameCheck, FullFrameBatch};
+use crate::dataset::tables::frames::check::FrameCheck;
+use crate::dataset::tables::frames::expected::FullFrameBatch;
 use crate::dataset::tables::frames::feature::n_slots;
 use crate::dataset::tables::scopes::check::{self as scopes, Labelled, ScopeBatch};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};

@@ -1,5 +1,7 @@
 //! Arrow arrays as columns: copied into vectors, or taken as they lie in memory.
 
+use std::ops::Range;
+
 use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array, StringArray};
 use arrow::buffer::{BooleanBuffer, OffsetBuffer, ScalarBuffer};
 use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
@@ -17,6 +19,17 @@ impl<T: ArrowNativeType> ListRows<T> {
     /// The values of a row.
     pub(crate) fn row(&self, at: usize) -> &[T] {
         &self.values[self.borders[at] as usize..self.borders[at + 1] as usize]
+    }
+
+    /// The values of some rows, one after another.
+    pub(crate) fn rows(&self, range: &Range<usize>) -> &[T] {
+        &self.values[self.borders[range.start] as usize..self.borders[range.end] as usize]
+    }
+
+    /// Whether each of some rows has so many values.
+    pub(crate) fn are_of_width(&self, range: &Range<usize>, width: usize) -> bool {
+        let borders = self.borders[range.start..=range.end].windows(2);
+        borders.fold(true, |all, ends| all & (ends[1] - ends[0] == width as i32))
     }
 }
 

@@ -3,9 +3,11 @@
 //! Rows of several episodes are gathered until they are worth a row group; then the buffers begin anew.
 
 pub(crate) mod check;
+pub(crate) mod expected;
 pub(crate) mod feature;
 pub(crate) mod paths;
 pub(crate) mod read;
+pub(crate) mod run;
 pub(crate) mod write;
 
 use crate::table::table;

@@ -48,17 +48,24 @@ impl EpisodeCheck {
 
     fn leaks(&mut self, row: &EpisodeRow) -> Vec<String> {
         let mut leaks = Vec::new();
-        let entry = self.tasks.entry(row.task_id.clone());
-        let (split, text) = entry.or_insert_with(|| (row.split.clone(), row.task_text.clone()));
-        if *split != row.split {
+        let known = self.tasks.get(&row.task_id);
+        if let Some((split, _)) = known.filter(|(split, _)| *split != row.split) {
             leaks.push(format!("task {:?} is {} here and {split} before", row.task_id, row.split));
         }
-        if *text != row.task_text {
+        if let Some((_, text)) = known.filter(|(_, text)| *text != row.task_text) {
             leaks.push(format!("task {:?} is {:?} here and {text:?} before", row.task_id, row.task_text));
         }
-        let split = self.splits.entry(row.task_text.clone()).or_insert_with(|| row.split.clone());
-        if *split != row.split && leaks.is_empty() {
-            leaks.push(format!("the task {:?} is {} here and {split} before", row.task_text, row.split));
+        if known.is_none() {
+            self.tasks.insert(row.task_id.clone(), (row.split.clone(), row.task_text.clone()));
+        }
+        match self.splits.get(&row.task_text) {
+            None => {
+                self.splits.insert(row.task_text.clone(), row.split.clone());
+            }
+            Some(split) if *split != row.split && leaks.is_empty() => {
+                leaks.push(format!("the task {:?} is {} here and {split} before", row.task_text, row.split));
+            }
+            Some(_) => {}
         }
         leaks
     }

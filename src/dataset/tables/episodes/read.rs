@@ -8,7 +8,7 @@ use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::Info;
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::tables::{episodes, meta_episodes};
-use crate::table::{Columns, TableError, TableReader, TableRows as _, batch};
+use crate::table::{Batch as _, Columns, TableError, TableReader, TextRows, batch};
 
 /// One episode's row.
 #[derive(Clone, Debug, PartialEq)]
@@ -226,40 +226,74 @@ fn place(chunk: i64, file: i64) -> FilePlace {
 }
 
 fn take_rows(columns: &mut Columns) -> Result<Vec<EpisodeRow>, TableError> {
-    let mut rows = episodes::Rows::take(columns)?;
-    Ok((0..rows.episode_index.len()).map(|at| row(&mut rows, at)).collect())
+    let n_rows = columns.n_rows();
+    let mut rows = EpisodeBatch::take(columns)?;
+    Ok((0..n_rows).map(|at| rows.row(at)).collect())
 }
 
-/// Takes one row out; where its frames are, is not yet known.
-fn row(rows: &mut episodes::Rows, at: usize) -> EpisodeRow {
-    let text = |column: &mut Vec<String>| std::mem::take(&mut column[at]);
-    EpisodeRow {
-        episode_index: rows.episode_index[at],
-        task_id: text(&mut rows.task_id),
-        task_text: text(&mut rows.task_text),
-        family: text(&mut rows.family),
-        split: text(&mut rows.split),
-        trial: rows.trial[at],
-        actor: text(&mut rows.actor),
-        outcome: text(&mut rows.outcome),
-        cause: rows.cause[at].take(),
-        is_success: rows.success[at],
-        specification: text(&mut rows.specification),
-        specification_frames: rows.specification_frames[at],
-        recording: text(&mut rows.recording),
-        recording_sha256: text(&mut rows.recording_sha256),
-        recording_index: rows.recording_index[at],
-        slots: std::mem::take(&mut rows.slots[at]),
-        n_frames: rows.n_frames[at],
-        n_calls: rows.n_calls[at],
-        n_scopes: rows.n_scopes[at],
-        data: FilePlace::default(),
-        first_index: 0,
-        calls: place(rows.calls_chunk[at], rows.calls_file[at]),
-        first_call: rows.calls_from[at],
-        scopes: place(rows.scopes_chunk[at], rows.scopes_file[at]),
-        first_scope: rows.scopes_from[at],
-        copies_problem: None,
-        meta: FilePlace::default(),
+batch! {
+    /// What is known of an episode, but for where its frames are.
+    struct EpisodeBatch of episodes {
+        episode_index,
+        task_id,
+        task_text,
+        family,
+        split,
+        trial,
+        actor,
+        outcome,
+        cause,
+        success,
+        recording,
+        recording_sha256,
+        recording_index,
+        n_frames,
+        specification,
+        specification_frames,
+        slots,
+        n_calls,
+        calls_chunk,
+        calls_file,
+        calls_from,
+        n_scopes,
+        scopes_chunk,
+        scopes_file,
+        scopes_from,
+    }
+}
+
+impl EpisodeBatch {
+    /// Takes a row out.
+    fn row(&mut self, at: usize) -> EpisodeRow {
+        let text = |column: &TextRows| column.row(at).to_owned();
+        EpisodeRow {
+            episode_index: self.episode_index[at],
+            task_id: text(&self.task_id),
+            task_text: text(&self.task_text),
+            family: text(&self.family),
+            split: text(&self.split),
+            trial: self.trial[at],
+            actor: text(&self.actor),
+            outcome: text(&self.outcome),
+            cause: self.cause.get(at).map(ToOwned::to_owned),
+            is_success: self.success.value(at),
+            specification: text(&self.specification),
+            specification_frames: self.specification_frames[at],
+            recording: text(&self.recording),
+            recording_sha256: text(&self.recording_sha256),
+            recording_index: self.recording_index[at],
+            slots: std::mem::take(&mut self.slots[at]),
+            n_frames: self.n_frames[at],
+            n_calls: self.n_calls[at],
+            n_scopes: self.n_scopes[at],
+            data: FilePlace::default(),
+            first_index: 0,
+            calls: place(self.calls_chunk[at], self.calls_file[at]),
+            first_call: self.calls_from[at],
+            scopes: place(self.scopes_chunk[at], self.scopes_file[at]),
+            first_scope: self.scopes_from[at],
+            copies_problem: None,
+            meta: FilePlace::default(),
+        }
     }
 }

@@ -3,58 +3,18 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
-use crate::dataset::files::cursor::Cursor;
+use crate::dataset::files::cursor::{Cursor, Rows};
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
 use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames;
+use crate::dataset::tables::frames::expected::{Before, FullFrameBatch, Labels, label_problem, step_problem};
 use crate::dataset::tables::frames::feature::ACTION_NAMES;
 use crate::dataset::tables::frames::paths::ProgramPaths;
 use crate::dataset::tables::frames::read::row_problem;
+use crate::dataset::tables::frames::run::Run;
 use crate::dataset::tables::texts::read::Texts;
-use crate::table::{TextTable, batch};
+use crate::table::TextTable;
 use crate::trace::{Observation, ProgramCall};
-
-batch! {
-    /// Every column.
-    pub(crate) struct FullFrameBatch of frames {
-        state,
-        action,
-        timestamp,
-        frame_index,
-        episode_index,
-        index,
-        task_index,
-        subtask_index,
-        done,
-        success,
-        time_secs,
-        boundary,
-        recording_frame,
-        gripper,
-        call_id,
-        program,
-    }
-}
-
-/// What the row before said that the next one must fit.
-struct Before {
-    action: [f32; ACTION_NAMES.len()],
-    gripper: [f32; 3],
-    time_secs: f64,
-    recording_frame: i64,
-}
-
-impl Before {
-    fn new(batch: &FullFrameBatch, at: usize) -> Self {
-        Self {
-            action: first(batch.action.row(at)),
-            gripper: first(batch.gripper.row(at)),
-            time_secs: batch.time_secs[at],
-            recording_frame: batch.recording_frame[at],
-        }
-    }
-}
 
 /// Checks the frames of one episode after another.
 pub(crate) struct FrameCheck {
@@ -73,12 +33,15 @@ struct StateRange {
 }
 
 impl StateRange {
-    fn widen(&mut self, state: &[f32]) {
-        self.min.resize(state.len(), f32::INFINITY);
-        self.max.resize(state.len(), f32::NEG_INFINITY);
-        for ((min, max), &value) in self.min.iter_mut().zip(&mut self.max).zip(state) {
-            *min = if value < *min { value } else { *min };
-            *max = if value > *max { value } else { *max };
+    /// Takes in rows of one width, one after another.
+    fn widen(&mut self, states: &[f32], width: usize) {
+        self.min.resize(width, f32::INFINITY);
+        self.max.resize(width, f32::NEG_INFINITY);
+        for state in states.chunks_exact(width) {
+            for ((min, max), &value) in self.min.iter_mut().zip(&mut self.max).zip(state) {
+                *min = if value < *min { value } else { *min };
+                *max = if value > *max { value } else { *max };
+            }
         }
     }
 }
@@ -105,28 +68,47 @@ impl FrameCheck {
         validation: &mut Validation,
     ) -> Result<(), DatasetError> {
         self.paths.note(calls.unwrap_or_default(), &mut self.path_texts);
-        let mut labels = calls.map(|calls| Labels::new(calls, &self.paths, self.path_texts.texts()));
+        let labels = || calls.map(|calls| Labels::new(calls, &self.paths, self.path_texts.texts()));
+        let mut running = labels();
         let mut before: Option<Before> = None;
-        let mut frame = 0;
-        while frame < row.n_frames {
-            let rows = cursor.next_rows(row.data, usize::try_from(row.n_frames - frame).unwrap_or(1))?;
-            for at in rows.range.clone() {
-                let batch = rows.batch;
-                let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
-                if let Some(problem) = row_problem(found, batch.state.row(at), row, frame, self.width) {
-                    return Err(rows.problem(at, problem));
-                }
-                validation.frames += 1;
-                self.range.widen(batch.state.row(at));
-                let mut problems = self.row_problems(batch, at, row, frame, texts);
-                problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
-                problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
-                before = Some(Before::new(batch, at));
-                for (code, problem) in problems {
-                    let place = format!("episode {}, frame {frame}", row.episode_index);
-                    validation.error(code, &rows.path(), place, problem);
-                }
-                frame += 1;
+        let mut first = 0;
+        while first < row.n_frames {
+            let rows = cursor.next_rows(row.data, usize::try_from(row.n_frames - first).unwrap_or(1))?;
+            let (batch, range) = (rows.batch, rows.range.clone());
+            let run = Run { batch, range: range.clone(), row, first, width: self.width, fps: self.fps };
+            if !run.is_right(texts, before.as_ref(), running.as_mut()) {
+                self.find(&rows, row, first, (texts, before.take(), labels()), validation)?;
+            }
+            self.range.widen(run.states(), self.width);
+            validation.frames += range.len() as u64;
+            before = Some(Before::new(batch, range.end - 1));
+            first += range.len() as i64;
+        }
+        Ok(())
+    }
+
+    /// Finds what is wrong with rows of which something is.
+    fn find(
+        &self,
+        rows: &Rows<'_, FullFrameBatch>,
+        row: &EpisodeRow,
+        first: i64,
+        (texts, mut before, mut labels): (&Texts, Option<Before>, Option<Labels<'_>>),
+        validation: &mut Validation,
+    ) -> Result<(), DatasetError> {
+        let batch = rows.batch;
+        for (at, frame) in rows.range.clone().zip(first..) {
+            let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
+            if let Some(problem) = row_problem(found, batch.state.row(at), row, frame, self.width) {
+                return Err(rows.problem(at, problem));
+            }
+            let mut problems = self.row_problems(batch, at, row, frame, texts);
+            problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
+            problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
+            before = Some(Before::new(batch, at));
+            for (code, problem) in problems {
+                let place = format!("episode {}, frame {frame}", row.episode_index);
+                validation.error(code, &rows.path(), place, problem);
             }
         }
         Ok(())
@@ -184,66 +166,4 @@ impl FrameCheck {
             validation.error("stats.range", &root.join(layout::STATS), "observation.state".to_owned(), message);
         }
     }
-}
-
-/// The action of the row before must lead to this one, later in time.
-fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
-    if batch.time_secs[at] <= before.time_secs || batch.recording_frame[at] <= before.recording_frame {
-        let found = (batch.time_secs[at], batch.recording_frame[at]);
-        return Some((
-            "frames.time",
-            format!("(ntp.time_secs, ntp.recording_frame) are {found:?}, not after the row before"),
-        ));
-    }
-    let [x, y, z] = first(batch.gripper.row(at));
-    let [from_x, from_y, from_z] = before.gripper;
-    let closed = batch.state.row(at).last().copied().unwrap_or(f32::NAN);
-    let expected = [x - from_x, y - from_y, z - from_z, closed];
-    (before.action != expected).then(|| {
-        ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
-    })
-}
-
-/// The first values of a vector; nothing but itself equals what is not there.
-fn first<const N: usize>(values: &[f32]) -> [f32; N] {
-    std::array::from_fn(|at| values.get(at).copied().unwrap_or(f32::NAN))
-}
-
-/// The labels that frames should have, in their order.
-struct Labels<'c> {
-    calls: &'c [ProgramCall],
-    /// Stacks of running programs, as texts.
-    paths: &'c ProgramPaths,
-    texts: &'c [String],
-    /// The calls that go on, by position; the root is always there.
-    running: Vec<usize>,
-    /// Position of the next call that has not begun.
-    next: usize,
-}
-
-impl<'c> Labels<'c> {
-    fn new(calls: &'c [ProgramCall], paths: &'c ProgramPaths, texts: &'c [String]) -> Self {
-        Self { calls, paths, texts, running: Vec::new(), next: 1 }
-    }
-
-    /// The deepest call that goes on from a frame, and its path. Frames are asked for in order.
-    fn at(&mut self, frame: i64) -> (i64, &'c str) {
-        let has_ended = |&call: &usize| i64::from(self.calls[call].frames.last()) <= frame;
-        while self.running.pop_if(|call| has_ended(call)).is_some() {}
-        while let Some(call) = self.calls.get(self.next).filter(|call| i64::from(call.frames.begin) <= frame) {
-            if i64::from(call.frames.last()) > frame {
-                self.running.push(self.next);
-            }
-            self.next += 1;
-        }
-        let deepest = self.running.last().copied().unwrap_or(0);
-        (deepest as i64, self.texts.get(self.paths.key(deepest) as usize).map_or("", String::as_str))
-    }
-}
-
-fn label_problem(expected: (i64, &str), batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
-    let found = (batch.call_id[at], batch.program.row(at));
-    (found != expected).then(|| {
-        ("frames.label", format!("(ntp.call_id, ntp.program) are {found:?}, but the calls make them {expected:?}"))
-    })
 }
