@@ -11,15 +11,19 @@
 mod atomic;
 mod contract;
 mod lock;
+mod plan;
 mod record;
+mod stage_dir;
 mod staging;
 mod unfinished;
 
 pub use atomic::{
-    AtomicFile, IoError, PARTIAL_PREFIX, create_dir, hex, read, read_json, remove_partials, sha256_bytes, sha256_file,
-    write, write_json,
+    AtomicFile, IoError, PARTIAL_PREFIX, create_dir, create_json, hex, read, read_json, remove_partials, sha256_bytes,
+    sha256_file, write, write_json,
 };
-pub use contract::{ContractError, FileEntry, Manifest, Plan, Receipt, StageDir};
+pub use contract::{ContractError, FileEntry, Manifest, Receipt};
 pub use lock::{LockError, RunLock};
+pub use plan::Plan;
+pub use stage_dir::{Committed, StageDir};
 pub use staging::{StagedDir, StagingError};
 pub use unfinished::remove_unfinished;

@@ -1,13 +1,15 @@
 //! Every clap definition; no logic.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
+use crate::cluster::Engine;
 use crate::dataset::edit::Ending;
 use crate::dataset::export::LabelForm;
-use crate::pipeline::Stage;
+use crate::pipeline::{ItemRanges, Stage};
 use crate::publish::{Date, License, Place, Release};
 use crate::render::Channel;
 use crate::task::{Family, Split};
@@ -63,6 +65,12 @@ pub enum Command {
     Rollout(StageArgs),
     /// Put the results together: an HTML page, JSON and CSV; prints Markdown.
     Report(StageArgs),
+    /// List the items of a pipeline's stages: the work that processes can share.
+    Items(ItemsArgs),
+    /// Hand the items that are left to Slurm, or to processes of this machine.
+    Submit(SubmitArgs),
+    /// Say how far a submitted run is; exit code 3 while something is left.
+    Status(StatusArgs),
     /// Say what a file or folder is, and how much is in it.
     Inspect(PathArgs),
     /// Check a file or folder: its checksums, and all that a reader relies on.
@@ -109,9 +117,126 @@ pub struct StageArgs {
     /// Do again what is up to date.
     #[arg(long)]
     pub force: bool,
-    /// Do this shard alone, in a stage that has shards: generate or rollout.
-    #[arg(long, value_name = "I")]
+    /// How much of a stage.
+    #[command(flatten)]
+    pub scope: ScopeArgs,
+    /// Go on where the file system has no locks and nothing else writes into the run directory.
+    #[arg(long)]
+    pub no_lock: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How much of one stage is done by this process; the whole when none is given. See docs/cluster.md.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "For many processes side by side")]
+pub struct ScopeArgs {
+    /// Do these items alone, by their numbers as `ntp items` lists them, e.g. 0-3,7.
+    #[arg(long, value_name = "A-B", group = "scope")]
+    pub items: Option<ItemRanges>,
+    /// Do part T, from 0, of N equal parts of all items.
+    #[arg(long, value_name = "T/N", group = "scope")]
+    pub part: Option<Part>,
+    /// Do shard I alone of every unit that has so many, in stages that have shards (generate, rollout).
+    #[arg(long, value_name = "I", group = "scope")]
     pub shard: Option<u32>,
+    /// Write the plans alone; with --force, what other plans have finished is removed.
+    #[arg(long, group = "scope")]
+    pub begin: bool,
+    /// Commit what others have done; nothing is done that is missing.
+    #[arg(long, group = "scope")]
+    pub commit: bool,
+    /// With --commit: wait so many seconds for what is missing.
+    #[arg(long, value_name = "S", requires = "commit", default_value_t = 0)]
+    pub wait: u64,
+}
+
+/// One of equal parts, as it is written: `3/64`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Which, from 0.
+    pub part: u64,
+    /// Of how many; at least 1.
+    pub of: u64,
+}
+
+impl FromStr for Part {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let numbers = word.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
+        match numbers {
+            Some((part, of)) if of > 0 => Ok(Self { part, of }),
+            _ => Err("is no part; written as T/N, e.g. 0/64 to 63/64".to_owned()),
+        }
+    }
+}
+
+/// `ntp items`.
+#[derive(Debug, Args)]
+pub struct ItemsArgs {
+    /// The pipeline file, or a study that names several.
+    #[arg(value_name = "PIPELINE.toml")]
+    pub pipeline: PathBuf,
+    /// Of this stage alone.
+    #[arg(long, value_name = "STAGE")]
+    pub stage: Option<Stage>,
+    /// The run directory [default: data/runs/NAME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Only those that are not done.
+    #[arg(long)]
+    pub left: bool,
+    /// Print the numbers alone, as `--items` and sbatch's `--array` take them; needs --stage.
+    #[arg(long, requires = "stage", conflicts_with = "json")]
+    pub array: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp submit`.
+#[derive(Debug, Args)]
+pub struct SubmitArgs {
+    /// The pipeline file, or a study that names several.
+    #[arg(value_name = "PIPELINE.toml")]
+    pub pipeline: PathBuf,
+    /// The run directory, which every node sees; what is handed over is kept in its folder `submit`.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Who runs the tasks: slurm or local.
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Engine,
+    /// Tasks that run at a time [default: with slurm as many as it likes, with local one a core].
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_running: Option<u32>,
+    /// Items that a task does one after the other [default: generate 100, rollout 40, train 1].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    pub per_task: Option<u32>,
+    /// An argument for every sbatch, e.g. --sbatch-arg=--partition=cpu; may be given several times.
+    #[arg(long, value_name = "ARG", allow_hyphen_values = true)]
+    pub sbatch_arg: Vec<String>,
+    /// Write the scripts, and hand nothing over.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Hand over another pipeline or program than before.
+    #[arg(long)]
+    pub force: bool,
+    /// Print what is left as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The run directory.
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Look again until nothing is left.
+    #[arg(long)]
+    pub watch: bool,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -1,10 +1,12 @@
 //! One file a command. Commands read the command line, call the library, and print: results to stdout, the rest to
 //! stderr.
 
+mod cluster;
 mod completions;
 mod dataset;
 mod explain;
 mod inspect;
+mod items;
 mod kind;
 mod output;
 mod publish;
@@ -23,6 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::artifact::remove_unfinished;
 use crate::cli::{Cli, Command};
+use crate::cluster::ClusterError;
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
 
@@ -78,7 +81,10 @@ fn stops_in_order(command: &Command) -> bool {
         | Command::Rollout(_)
         | Command::Report(_)
         | Command::Publish(_) => true,
-        Command::Inspect(_)
+        Command::Items(_)
+        | Command::Submit(_)
+        | Command::Status(_)
+        | Command::Inspect(_)
         | Command::Validate(_)
         | Command::Replay(_)
         | Command::Render(_)
@@ -98,6 +104,9 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if matches!(error.downcast_ref(), Some(PublishError::Interrupted)) {
         return 130;
     }
+    if error.downcast_ref::<ClusterError>().is_some_and(ClusterError::is_usage) {
+        return 2;
+    }
     match error.downcast_ref::<PipelineError>() {
         Some(PipelineError::Interrupted) => 130,
         Some(error) if error.is_usage() => 2,
@@ -114,6 +123,9 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Train(args) => stages::run(args, Stage::Train, Stage::Train, stop),
         Command::Rollout(args) => stages::run(args, Stage::Rollout, Stage::Rollout, stop),
         Command::Report(args) => stages::report(args, stop),
+        Command::Items(args) => items::run(args),
+        Command::Submit(args) => cluster::submit(args),
+        Command::Status(args) => cluster::status(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),

@@ -15,6 +15,7 @@ pub mod scene;
 pub mod seed;
 pub mod table;
 
+pub mod cluster;
 pub mod dataset;
 pub mod expert;
 pub mod lineage;

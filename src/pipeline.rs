@@ -19,31 +19,44 @@ mod detections;
 mod error;
 mod eye;
 mod facts;
+mod failures;
 mod filmstrips;
 mod gallery;
 mod generate;
+mod items;
 mod layout;
+mod options;
+mod recorded;
 mod report;
 mod resolve;
 mod rollout;
 mod runner;
+mod shared;
 mod spec;
 mod stage;
+mod stage_report;
 mod study;
 mod tasks;
 mod train;
 mod trials;
+mod unit;
+mod upstream;
 mod verify;
 
 pub use demonstration::demonstration_of;
 pub use error::PipelineError;
+pub use failures::Failure;
+pub use items::{Item, ItemRanges, ItemState, items, plans};
 pub use layout::RunDir;
+pub use options::{Options, Scope};
+pub use recorded::Recorded;
 pub use resolve::Pipeline;
-pub use runner::{Options, StageReport, Status, run, run_study};
+pub use runner::{run, run_study};
 pub use spec::{
     CountsSpec, GenerateSpec, ModelSpec, OrderSpec, PipelineSpec, RecordedFrames, ReportSpec, RolloutSpec, SuiteSpec,
     TasksSpec,
 };
 pub use stage::Stage;
+pub use stage_report::{StageReport, Status};
 pub use study::{PipelineFile, Study, StudySpec};
 pub use verify::{Verification, verify};

@@ -84,13 +84,36 @@ impl AtomicFile {
     ///
     /// When the disk is full or the name cannot be taken; then nothing is at the final name that was not before.
     pub fn commit(self) -> Result<(), IoError> {
+        let (file, path, unfinished) = self.synced()?;
+        file.persist(&path).map_err(|error| IoError::system("rename to", &path)(error.error))?;
+        drop(unfinished);
+        sync_folder(&path)
+    }
+
+    /// Flushes, syncs and takes the final name if nothing has it; whether this file is there now. Of several processes
+    /// that do so at once one alone succeeds, also on shared folders.
+    ///
+    /// # Errors
+    ///
+    /// When the disk is full or the name cannot be taken for another reason than that something has it.
+    pub fn commit_if_absent(self) -> Result<bool, IoError> {
+        let (file, path, unfinished) = self.synced()?;
+        match file.persist_noclobber(&path) {
+            Err(error) if error.error.kind() == std::io::ErrorKind::AlreadyExists => return Ok(false),
+            kept => kept.map_err(|error| IoError::system("take the name", &path)(error.error))?,
+        };
+        drop(unfinished);
+        sync_folder(&path)?;
+        Ok(true)
+    }
+
+    /// The whole file on disk, under its temporary name.
+    fn synced(self) -> Result<(NamedTempFile, PathBuf, Unfinished), IoError> {
         let Self { writer, path, unfinished } = self;
         let file = writer.into_inner().map_err(|error| IoError::system("write", &path)(error.into_error()))?;
         file.as_file().sync_all().map_err(IoError::system("sync", &path))?;
         set_usual_permissions(file.as_file()).map_err(IoError::system("set permissions of", &path))?;
-        file.persist(&path).map_err(|error| IoError::system("rename to", &path)(error.error))?;
-        drop(unfinished);
-        sync_folder(&path)
+        Ok((file, path, unfinished))
     }
 }
 
@@ -203,10 +226,25 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, IoError> {
 ///
 /// As [`write()`].
 pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), IoError> {
+    write(path, &json_text(path, value)?)
+}
+
+/// Writes indented JSON if nothing is at the path; whether it is there now.
+///
+/// # Errors
+///
+/// As [`AtomicFile::commit_if_absent`].
+pub fn create_json<T: Serialize>(path: &Path, value: &T) -> Result<bool, IoError> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(&json_text(path, value)?).map_err(IoError::system("write", path))?;
+    file.commit_if_absent()
+}
+
+fn json_text<T: Serialize>(path: &Path, value: &T) -> Result<Vec<u8>, IoError> {
     let mut text =
         serde_json::to_vec_pretty(value).map_err(|source| IoError::Json { path: path.to_owned(), source })?;
     text.push(b'\n');
-    write(path, &text)
+    Ok(text)
 }
 
 /// Lower-case hexadecimal.

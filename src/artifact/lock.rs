@@ -21,6 +21,14 @@ pub enum LockError {
         /// The run directory.
         directory: PathBuf,
     },
+    /// The file system has no locks.
+    #[error("the file system of {} has no file locks ({source}); --no-lock goes without, where nothing else writes there", directory.display())]
+    Unsupported {
+        /// The run directory.
+        directory: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// The lock file could not be opened.
     #[error(transparent)]
     Io(#[from] IoError),
@@ -31,7 +39,7 @@ impl RunLock {
     ///
     /// # Errors
     ///
-    /// [`LockError::Held`] at once when another process has it.
+    /// [`LockError::Held`] at once when another process has it; [`LockError::Unsupported`] where there are no locks.
     pub fn take(directory: &Path) -> Result<Self, LockError> {
         Self::lock(directory, File::try_lock)
     }
@@ -40,7 +48,7 @@ impl RunLock {
     ///
     /// # Errors
     ///
-    /// [`LockError::Held`] at once when another process has it alone.
+    /// [`LockError::Held`] at once when another process has it alone; [`LockError::Unsupported`] where there are none.
     pub fn share(directory: &Path) -> Result<Self, LockError> {
         Self::lock(directory, File::try_lock_shared)
     }
@@ -57,7 +65,17 @@ impl RunLock {
         match lock(&file) {
             Ok(()) => Ok(Self { _file: file }),
             Err(TryLockError::WouldBlock) => Err(LockError::Held { directory: directory.to_owned() }),
+            Err(TryLockError::Error(source)) if has_no_locks(&source) => {
+                Err(LockError::Unsupported { directory: directory.to_owned(), source })
+            }
             Err(TryLockError::Error(source)) => Err(IoError::system("lock", &path)(source).into()),
         }
     }
+}
+
+/// ENOSYS, EOPNOTSUPP and ENOLCK on Linux: a shared folder that was mounted without locks.
+fn has_no_locks(error: &std::io::Error) -> bool {
+    const ENOLCK: i32 = 37;
+    error.kind() == std::io::ErrorKind::Unsupported
+        || (cfg!(target_os = "linux") && error.raw_os_error() == Some(ENOLCK))
 }

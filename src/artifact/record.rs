@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::artifact::contract::{ContractError, Manifest, Plan, Receipt, StageDir, read_if_there};
-use crate::artifact::{IoError, read, sha256_bytes};
+use crate::artifact::stage_dir::read_if_there;
+use crate::artifact::{ContractError, IoError, Manifest, Plan, Receipt, StageDir, read, sha256_bytes};
 
 impl StageDir {
     /// Compares plan and receipts with the manifest. A folder without `receipts/` has been published, which leaves them
@@ -16,7 +16,7 @@ impl StageDir {
     pub fn check_record(&self, manifest: &Manifest) -> Result<(), ContractError> {
         let path = self.plan_path();
         let plan = self.plan()?.ok_or_else(|| differs(&path, "missing".to_owned()))?;
-        // Of the text: numbers may not survive being read.
+        // Of the text: that of a number may have changed by less than its value tells.
         let found = (sha256_bytes(&compact(&read(&path)?)), plan.stage.as_str());
         let expected = (manifest.plan_id.clone(), manifest.stage.as_str());
         if found != expected {

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::artifact;
-use crate::cli::StageArgs;
+use crate::cli::{Part, ScopeArgs, StageArgs};
 use crate::commands::{CommandOutcome, output};
-use crate::pipeline::{self, Options, PipelineFile, RunDir, Stage, StageReport, Status};
+use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Status};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
 pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
@@ -28,6 +28,9 @@ pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBoo
 
 /// Makes the report and prints it.
 pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
+    if scope(&args.scope) != Scope::Whole {
+        return run(args, Stage::Report, Stage::Report, stop);
+    }
     let (dir, reports) = run_stages(args, Stage::Report, Stage::Report, stop)?;
     if args.dry_run {
         reports.iter().try_for_each(|report| output::print(&line(report)))?;
@@ -56,12 +59,13 @@ fn run_stages(
     let options = Options {
         from,
         to,
+        scope: scope(&args.scope),
         jobs: args.jobs.map_or_else(all_cores, usize::from),
         dry_run: args.dry_run,
         force: args.force,
-        shard: args.shard,
+        no_lock: args.no_lock,
         progress: true,
-        commit: commit_of(&args.pipeline),
+        commit: commit_of,
         experiment: None,
         stop: Arc::clone(stop),
     };
@@ -70,6 +74,17 @@ fn run_stages(
         PipelineFile::Study(study) => pipeline::run_study(study, &dir, &options)?,
     };
     Ok((dir, reports))
+}
+
+fn scope(args: &ScopeArgs) -> Scope {
+    match args {
+        ScopeArgs { items: Some(ItemRanges(ranges)), .. } => Scope::Items(ranges.clone()),
+        ScopeArgs { part: Some(Part { part, of }), .. } => Scope::Part { part: *part, of: *of },
+        ScopeArgs { shard: Some(shard), .. } => Scope::Shard(*shard),
+        ScopeArgs { begin: true, .. } => Scope::Begin,
+        ScopeArgs { commit: true, wait, .. } => Scope::Commit { wait_secs: *wait },
+        _ => Scope::Whole,
+    }
 }
 
 /// Of which commit a file is, if it is under version control and git is there.
@@ -92,7 +107,7 @@ pub(super) fn run_directory(out: Option<&Path>, file: &PipelineFile) -> PathBuf 
     out.map_or_else(|| Path::new("data/runs").join(file.name()), Path::to_owned)
 }
 
-fn all_cores() -> usize {
+pub(super) fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
@@ -101,15 +116,20 @@ pub(super) fn line(report: &StageReport) -> String {
     let what = match report.status {
         Status::UpToDate => "up to date".to_owned(),
         Status::Done => format!("done (before: {})", report.reason),
+        Status::ShardDone => report.reason.clone(),
+        Status::Begun => format!("begun ({})", report.reason),
         Status::Needed => format!("to do: {}", report.reason),
+        Status::Missing => report.reason.clone(),
+        Status::Failed => format!("failed: {}", report.reason),
     };
+    let shard = report.shard.map(|shard| format!(" shard {shard} of {}", report.shards)).unwrap_or_default();
     let episodes = match (report.episodes, report.failed) {
         (0, _) => String::new(),
         (episodes, 0) => format!("  {episodes} episodes"),
         (episodes, failed) => format!("  {episodes} episodes, {failed} failed"),
     };
     let experiment = report.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
-    let name = format!("{experiment}{}", report.unit);
+    let name = format!("{experiment}{}{shard}", report.unit);
     let name = if std::io::stdout().is_terminal() { format!("{name:<52}") } else { name };
     format!("{name}  {what}{episodes}")
 }
@@ -125,8 +145,25 @@ fn left(reports: &[StageReport]) -> String {
     if stages.is_empty() { "nothing is left to do".to_owned() } else { format!("left: {}", stages.join(", ")) }
 }
 
+/// What failed or is missing, by stage and item: `generate: 2 items failed: 3,17`.
+fn undone(reports: &[StageReport]) -> Option<String> {
+    let stage = reports.last()?.stage;
+    let failed = reports.iter().filter(|report| report.status == Status::Failed).filter_map(|report| report.item);
+    let missing = reports.iter().flat_map(|report| report.missing.iter().copied());
+    let told = |numbers: Vec<u64>, what: &str| {
+        let count = numbers.len();
+        let items: ItemRanges = numbers.into_iter().collect();
+        (count > 0).then(|| format!("{stage}: {count} items {what}: {items}"))
+    };
+    told(failed.collect(), "failed").or_else(|| told(missing.collect(), "are missing"))
+}
+
 /// Demonstrations that failed are left out of the dataset; rollouts that failed are a result.
 pub(super) fn outcome(reports: &[StageReport]) -> CommandOutcome {
+    if let Some(left) = undone(reports) {
+        output::note(&left);
+        return CommandOutcome::CheckFailed;
+    }
     let left_out: u64 =
         reports.iter().filter(|report| report.stage == Stage::Convert).map(|report| report.failed).sum();
     if left_out == 0 {

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 
-use crate::cli::{StageArgs, TasksArgs};
+use crate::cli::{ScopeArgs, StageArgs, TasksArgs};
 use crate::commands::{CommandOutcome, output, stages};
 use crate::pipeline::Stage;
 use crate::task::{self, Split, TaskSet};
@@ -21,7 +21,8 @@ pub(super) fn run(args: &TasksArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Co
         jobs: None,
         dry_run: args.dry_run,
         force: args.force,
-        shard: None,
+        scope: ScopeArgs::default(),
+        no_lock: false,
         json: args.json,
     };
     stages::run(&stage_args, Stage::Tasks, Stage::Tasks, stop)

@@ -125,10 +125,25 @@ fn run_directories(folder: &Path) -> Vec<PathBuf> {
     full.ancestors().skip(1).take(3).map(Path::to_owned).collect()
 }
 
-/// The commit that a run noted for a plan, in the costs at its root.
+/// The commit that a run noted for a plan, in the costs at its root: of a whole unit, or of shards.
 fn commit(folder: &Path, plan_id: &str) -> Option<String> {
-    let costs = run_directories(folder).into_iter().find_map(|run| read_json::<Value>(&run.join("costs.json")).ok())?;
-    let units = costs.get("units")?.as_object()?;
-    let unit = units.values().find(|unit| unit.get("plan_id").and_then(Value::as_str) == Some(plan_id))?;
-    unit.get("commit")?.as_str().map(ToOwned::to_owned)
+    let is_of_plan = |cost: &&Value| cost.get("plan_id").and_then(Value::as_str) == Some(plan_id);
+    let commit = |cost: &Value| Some(cost.get("commit")?.as_str()?.to_owned());
+    run_directories(folder).into_iter().find_map(|run| {
+        let whole = read_json::<Value>(&run.join("costs.json")).ok();
+        let units = whole.as_ref().and_then(|costs| costs.get("units")?.as_object());
+        let of_unit = units.and_then(|units| units.values().find(is_of_plan)).and_then(commit);
+        of_unit.or_else(|| noted_costs(&run.join("costs")).iter().find(is_of_plan).and_then(commit))
+    })
+}
+
+/// What processes that worked side by side noted.
+fn noted_costs(folder: &Path) -> Vec<Value> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.sort();
+    paths
+        .iter()
+        .flat_map(|path| if path.is_dir() { noted_costs(path) } else { read_json(path).into_iter().collect() })
+        .collect()
 }

@@ -3,57 +3,142 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
+use tempfile::TempDir;
 
-use crate::artifact::{FileEntry, IoError, PARTIAL_PREFIX, Plan, Receipt, StageDir};
+use crate::artifact::{FileEntry, IoError, Manifest, PARTIAL_PREFIX, StageDir};
 use crate::dataset::{
     self, ConvertConfig, ConvertError, ConvertSummary, FrameChoice, RecordedEpisode, RecordingEpisodes,
 };
-use crate::pipeline::runner::{Context, Part, Unit};
-use crate::pipeline::{PipelineError, Stage};
+use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage};
 use crate::recording::{RecordingError, ShardReader};
 
-pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
-    let version = context.dir.recordings().version()?;
-    let inputs = BTreeMap::from([(Stage::Generate.name().to_owned(), version)]);
-    let plan = Plan::new(Stage::Convert.name(), 1, inputs, json!({ "convert": context.pipeline.spec.convert }));
-    Ok(vec![Unit { name: "convert".to_owned(), dir: context.dir.dataset(), plan, part: Part::Whole }])
+/// Raised when the same settings make another dataset.
+const VERSION: u32 = 1;
+
+/// The dataset of an experiment.
+pub(super) struct Dataset<'p>(&'p Pipeline);
+
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Dataset<'_>> {
+    vec![Dataset(pipeline)]
 }
 
-pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let recordings = context.dir.recordings();
-    let manifest = recordings.finished()?;
-    recordings.check_files(&manifest, true)?;
-    let partial = StageDir::new(Stage::Convert.name(), context.dir.root().join(format!("{PARTIAL_PREFIX}dataset")));
-    partial.clear()?;
-    let progress = context.progress(unit, manifest.episodes, "episodes");
-    let step = || {
-        progress.inc(1);
-        context.go_on()
-    };
-    let source = Source { recordings: &recordings, files: &manifest.files, config: &context.pipeline.spec.convert };
-    let boundaries = |reader: ShardReader| reader.boundaries().pictured();
-    let summary = match source.config.frames {
-        FrameChoice::Boundaries => source.convert(partial.path(), boundaries, step),
-        FrameChoice::All => source.convert(partial.path(), ShardReader::pictured, step),
-    };
-    context.go_on()?;
-    let summary = summary?;
-    let entries: Result<Vec<FileEntry>, IoError> =
-        summary.files.iter().map(|file| FileEntry::of(partial.path(), file)).collect();
-    partial.write_plan(&unit.plan)?;
-    partial.commit_shard(&Receipt {
-        plan_id: unit.plan.id(),
-        shard: 0,
-        episodes: summary.episodes,
-        failed: summary.failed_left_out + summary.failed_included,
-        files: entries?,
-    })?;
-    partial.commit(&unit.plan, &[])?;
-    unit.dir.clear()?;
-    std::fs::rename(partial.path(), unit.dir.path()).map_err(IoError::system("rename to", unit.dir.path()))?;
-    progress.finish(&format!("{} episodes, {} frames, {} calls", summary.episodes, summary.frames, summary.calls));
-    Ok(())
+impl Unit for Dataset<'_> {
+    fn stage(&self) -> Stage {
+        Stage::Convert
+    }
+
+    fn stage_version(&self) -> u32 {
+        VERSION
+    }
+
+    fn name(&self) -> String {
+        Stage::Convert.name().to_owned()
+    }
+
+    fn dir(&self, run: &RunDir) -> StageDir {
+        run.dataset()
+    }
+
+    fn amount(&self, _shard: u32) -> Amount {
+        let spec = &self.0.spec;
+        Amount { count: u64::from(spec.tasks.train) * u64::from(spec.generate.trials_per_task), of: "episodes" }
+    }
+
+    fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+        Ok(BTreeMap::from([(Stage::Generate.name().to_owned(), run.recordings().version()?)]))
+    }
+
+    fn settings(&self) -> Value {
+        json!({ "convert": self.0.spec.convert })
+    }
+
+    fn appears_whole(&self) -> bool {
+        true
+    }
+
+    fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+        let recordings = job.context.dir.recordings();
+        let manifest = recordings.finished()?;
+        recordings.check_files(&manifest, true)?;
+        Ok(Box::new(Converter { config: &self.0.spec.convert, job, recordings, manifest }))
+    }
+}
+
+/// Converts recordings.
+struct Converter<'j> {
+    config: &'j ConvertConfig,
+    job: &'j Job<'j>,
+    recordings: StageDir,
+    manifest: Manifest,
+}
+
+impl Worker for Converter<'_> {
+    fn shard(&self, shard: u32) -> Result<Option<Made>, PipelineError> {
+        let job = self.job;
+        let staged = Staged::begin(job.context.dir)?;
+        let ConvertSummary { episodes, frames, calls, failed_left_out, failed_included, files, .. } =
+            self.convert(&staged.dir)?;
+        let made = Made {
+            episodes,
+            failed: failed_left_out + failed_included,
+            told: Some(format!("{episodes} episodes, {frames} frames, {calls} calls")),
+            ..Made::files(&staged.dir, files.iter().map(String::as_str))?
+        };
+        staged.dir.write_plan(&job.plan)?;
+        staged.dir.commit_shard(&job.receipt_of(shard, &made))?;
+        staged.dir.commit(&job.plan, &[])?;
+        Ok(staged.take_place(job, shard)?.then_some(made))
+    }
+}
+
+impl Converter<'_> {
+    fn convert(&self, into: &StageDir) -> Result<ConvertSummary, PipelineError> {
+        let Self { config, job, recordings, manifest } = self;
+        let step = || {
+            job.progress.inc(1);
+            job.context.go_on()
+        };
+        let source = Source { recordings, files: &manifest.files, config };
+        let boundaries = |reader: ShardReader| reader.boundaries().pictured();
+        let summary = match config.frames {
+            FrameChoice::Boundaries => source.convert(into.path(), boundaries, step),
+            FrameChoice::All => source.convert(into.path(), ShardReader::pictured, step),
+        };
+        job.context.go_on()?;
+        Ok(summary?)
+    }
+}
+
+/// A dataset that is being made beside its place. Dropped, it leaves nothing.
+struct Staged {
+    dir: StageDir,
+    _around: TempDir,
+}
+
+impl Staged {
+    fn begin(run: &RunDir) -> Result<Self, IoError> {
+        let prefix = format!("{PARTIAL_PREFIX}dataset-");
+        let around = tempfile::Builder::new().prefix(&prefix).tempdir_in(run.root());
+        let around = around.map_err(IoError::system("create a folder in", run.root()))?;
+        Ok(Self { dir: StageDir::new(Stage::Convert.name(), around.path().join("dataset")), _around: around })
+    }
+
+    /// Moves the dataset to its place, in place of another plan's; false when another process has made it meanwhile.
+    fn take_place(&self, job: &Job<'_>, shard: u32) -> Result<bool, IoError> {
+        let place = job.dir.path();
+        let rename = || std::fs::rename(self.dir.path(), place);
+        if !job.is_done(shard)? && rename().is_ok() {
+            return Ok(true);
+        }
+        if job.is_done(shard)? {
+            return Ok(false);
+        }
+        job.dir.clear()?;
+        rename().map_err(IoError::system("rename to", place))?;
+        Ok(true)
+    }
 }
 
 /// The recordings to be converted, and how.

@@ -3,7 +3,7 @@
 use crate::artifact::Plan;
 use crate::pipeline::generate::{demonstrate, simulation_config};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, SuiteSpec};
+use crate::pipeline::{OrderSpec, PipelineError, Recorded, RecordedFrames, SuiteSpec};
 use crate::seed::Seed;
 use crate::sim::SimulationConfig;
 use crate::task::{Task, TaskSet};
@@ -55,13 +55,7 @@ impl Demonstrations<'_> {
 ///
 /// When the world cannot be made.
 pub fn demonstration_of(plan: &Plan, tasks: &TaskSet, rollout: &Episode) -> Result<Option<Episode>, PipelineError> {
-    let value = |key: &str| plan.config.get(key).cloned().unwrap_or_default();
-    let settings = (
-        serde_json::from_value::<u64>(value("seed")),
-        serde_json::from_value::<SuiteSpec>(value("suite")),
-        serde_json::from_value::<SimulationConfig>(value("simulation")),
-    );
-    let (Ok(seed), Ok(suite), Ok(simulation)) = settings else { return Ok(None) };
+    let Some(Recorded { seed, suite: Some(suite), simulation, .. }) = Recorded::of(plan) else { return Ok(None) };
     let demonstrations = Demonstrations { seed, suite: &suite, simulation: &simulation, frames: RecordedFrames::All };
     let provenance = &rollout.provenance;
     let task = tasks.find(&provenance.task_id).and_then(|task| demonstrations.ordered(task));

@@ -36,6 +36,9 @@ pub enum PipelineError {
         /// What is wrong and what is allowed.
         problem: String,
     },
+    /// What several items read cannot be read.
+    #[error("{0}")]
+    Inputs(String),
     /// Ctrl-C.
     #[error("interrupted; the same command carries on")]
     Interrupted,
@@ -134,6 +137,6 @@ pub enum PipelineError {
 impl PipelineError {
     /// Whether the command or the pipeline file is at fault, and nothing was written.
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Syntax { .. } | Self::Value { .. })
+        matches!(self, Self::Syntax { .. } | Self::Value { .. } | Self::Contract(ContractError::OtherPlan { .. }))
     }
 }

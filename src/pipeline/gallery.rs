@@ -2,8 +2,7 @@
 
 use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader, Wanted};
 use crate::model::Pictures;
-use crate::pipeline::PipelineError;
-use crate::pipeline::runner::Context;
+use crate::pipeline::{Pipeline, PipelineError, RunDir};
 use crate::trace::GripperState;
 use crate::training::Gallery;
 
@@ -22,11 +21,11 @@ pub(super) struct Streamed {
 /// # Errors
 ///
 /// When the dataset has no pictures of the camera, or none of a trial's frame: it was made before there was a camera.
-pub(super) fn open(context: &Context<'_>, trials: &DatasetTrials) -> Result<Streamed, PipelineError> {
-    let camera = context.pipeline.spec.generate.cameras.first();
+pub(super) fn open(pipeline: &Pipeline, run: &RunDir, trials: &DatasetTrials) -> Result<Streamed, PipelineError> {
+    let camera = pipeline.spec.generate.cameras.first();
     let camera = camera.map(|camera| camera.name.as_str()).unwrap_or_default();
     let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
-    let loader = PictureLoader::open(context.dir.dataset().path(), camera, rows.collect(), MOST_BYTES)?;
+    let loader = PictureLoader::open(run.dataset().path(), camera, rows.collect(), MOST_BYTES)?;
     Ok(Streamed { loader, grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect() })
 }
 

@@ -1,86 +1,130 @@
 //! Stage `generate`: the expert demonstrates every training task, shard by shard.
 
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-use serde_json::json;
+use std::collections::BTreeMap;
+use std::ops::Range;
 
-use crate::artifact::{FileEntry, Plan, Receipt};
+use serde_json::{Value, json};
+
+use crate::artifact::{FileEntry, Manifest, StageDir};
 use crate::expert;
-use crate::pipeline::runner::{Context, Part, Unit};
+use crate::pipeline::recorded::GenerateSettings;
 use crate::pipeline::trials::trial;
-use crate::pipeline::{PipelineError, RecordedFrames, Stage, tasks};
-use crate::progress::Progress;
+use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RecordedFrames, RunDir, Stage, tasks};
 use crate::recording::ShardWriter;
 use crate::seed::Seed;
 use crate::sim::{AdversaryConfig, SimError, Simulation, SimulationConfig};
-use crate::task::{self, Split, Task, Trial};
+use crate::task::{self, Task, Trial};
 use crate::trace::{Actor, Episode, Provenance};
 
-pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
-    let spec = &context.pipeline.spec;
-    let (task_set, inputs) = tasks::read(context)?;
-    let n_tasks = task_set.tasks.iter().filter(|task| task.split == Split::Seen).count() as u32;
-    let n_episodes = n_tasks * spec.generate.trials_per_task;
-    let shards = n_episodes.div_ceil(spec.generate.episodes_per_shard);
-    let config = json!({ "seed": spec.seed, "episodes": n_episodes, "generate": spec.generate });
-    let plan = Plan::new(Stage::Generate.name(), shards, inputs, config);
-    Ok(vec![Unit { name: "generate".to_owned(), dir: context.dir.recordings(), plan, part: Part::Whole }])
+/// Raised when the same settings make other recordings.
+const VERSION: u32 = 1;
+
+/// The demonstrations of an experiment.
+pub(super) struct Demonstrated<'p>(&'p Pipeline);
+
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Demonstrated<'_>> {
+    vec![Demonstrated(pipeline)]
 }
 
-pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let (task_set, _) = tasks::read(context)?;
-    let seen: Vec<Task> = task_set.tasks.into_iter().filter(|task| task.split == Split::Seen).collect();
-    unit.dir.begin(&unit.plan)?;
-    let n_episodes = seen.len() as u64 * u64::from(context.pipeline.spec.generate.trials_per_task);
-    let progress = context.progress(unit, n_episodes, "episodes");
-    let shards = context.shards(unit)?;
-    shards.into_par_iter().try_for_each(|shard| work_shard(context, unit, &seen, shard, &progress))?;
-    if context.options.shard.is_none() {
-        let manifest = unit.dir.commit(&unit.plan, &[])?;
-        progress.finish(&format!("{} episodes, {} failed", manifest.episodes, manifest.failed));
+impl Demonstrated<'_> {
+    fn n_episodes(&self) -> u32 {
+        self.0.spec.tasks.train * self.0.spec.generate.trials_per_task
     }
-    Ok(())
+
+    /// The episodes of a shard.
+    fn episodes(&self, shard: u32) -> Range<u32> {
+        let per_shard = self.0.spec.generate.episodes_per_shard;
+        let end = shard.saturating_add(1).saturating_mul(per_shard);
+        shard.saturating_mul(per_shard).min(self.n_episodes())..end.min(self.n_episodes())
+    }
 }
 
-/// Does one shard unless its receipt is there.
-fn work_shard(
-    context: &Context<'_>,
-    unit: &Unit,
-    seen: &[Task],
-    shard: u32,
-    progress: &Progress,
-) -> Result<(), PipelineError> {
-    let spec = &context.pipeline.spec.generate;
-    let n_episodes = seen.len() as u64 * u64::from(spec.trials_per_task);
-    let per_shard = u64::from(spec.episodes_per_shard);
-    let range = u64::from(shard) * per_shard..n_episodes.min((u64::from(shard) + 1) * per_shard);
-    if unit.dir.receipt(&unit.plan, shard)?.is_some() {
-        progress.inc(range.end - range.start);
-        return Ok(());
+impl Unit for Demonstrated<'_> {
+    fn stage(&self) -> Stage {
+        Stage::Generate
     }
-    let name = format!("shard-{shard:05}-of-{:05}.mcap", unit.plan.shards);
-    let plan_json = serde_json::to_string(&unit.plan).unwrap_or_default();
-    let writer = ShardWriter::create(&unit.dir.path().join(&name), &plan_json)?;
-    let mut writer = writer.with_cameras(&spec.cameras);
-    let mut failed = 0;
-    for index in range.clone() {
-        context.go_on()?;
-        let task = &seen[(index / u64::from(spec.trials_per_task)) as usize];
-        let trial_index = (index % u64::from(spec.trials_per_task)) as u32;
-        let trial = trial(context.pipeline.spec.seed, "demonstration", task, trial_index, spec.counts);
-        let episode = demonstrate(task, &trial, index, &simulation_config(spec.frames, &spec.simulation))?;
-        failed += u64::from(!episode.outcome.is_success());
-        writer.write(&episode)?;
-        progress.inc(1);
+
+    fn stage_version(&self) -> u32 {
+        VERSION
     }
-    writer.finish()?;
-    unit.dir.commit_shard(&Receipt {
-        plan_id: unit.plan.id(),
-        shard,
-        episodes: range.end - range.start,
-        failed,
-        files: vec![FileEntry::of(unit.dir.path(), &name)?],
-    })?;
-    Ok(())
+
+    fn name(&self) -> String {
+        Stage::Generate.name().to_owned()
+    }
+
+    fn dir(&self, run: &RunDir) -> StageDir {
+        run.recordings()
+    }
+
+    fn shards(&self) -> u32 {
+        self.n_episodes().div_ceil(self.0.spec.generate.episodes_per_shard)
+    }
+
+    fn amount(&self, shard: u32) -> Amount {
+        Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
+    }
+
+    fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+        tasks::version(run)
+    }
+
+    fn settings(&self) -> Value {
+        let spec = &self.0.spec;
+        json!(GenerateSettings { seed: spec.seed, episodes: self.n_episodes(), generate: spec.generate.clone() })
+    }
+
+    fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+        let tasks = tasks::training(self.0, job.context.dir)?;
+        Ok(Box::new(Demonstrator { unit: self, job, tasks }))
+    }
+
+    fn told(&self, manifest: &Manifest) -> String {
+        format!("{} episodes, {} failed", manifest.episodes, manifest.failed)
+    }
+}
+
+/// Demonstrates shards.
+struct Demonstrator<'j> {
+    unit: &'j Demonstrated<'j>,
+    job: &'j Job<'j>,
+    tasks: Vec<Task>,
+}
+
+impl Worker for Demonstrator<'_> {
+    fn shard(&self, shard: u32) -> Result<Option<Made>, PipelineError> {
+        let Self { unit, job, .. } = self;
+        let spec = &unit.0.spec.generate;
+        let name = format!("shard-{shard:05}-of-{:05}.mcap", job.plan.shards);
+        let writer = ShardWriter::create(&job.dir.path().join(&name), &job.plan_json())?;
+        let mut writer = writer.with_cameras(&spec.cameras);
+        let range = unit.episodes(shard);
+        let mut failed = 0;
+        for index in range.clone() {
+            job.context.go_on()?;
+            let episode = self.episode(index)?;
+            failed += u64::from(!episode.outcome.is_success());
+            writer.write(&episode)?;
+            job.progress.inc(1);
+        }
+        if job.is_done(shard)? {
+            return Ok(None);
+        }
+        writer.finish()?;
+        let files = vec![FileEntry::of(job.dir.path(), &name)?];
+        Ok(Some(Made { episodes: range.len() as u64, failed, files, told: None }))
+    }
+}
+
+impl Demonstrator<'_> {
+    fn episode(&self, index: u32) -> Result<Episode, PipelineError> {
+        let spec = &self.unit.0.spec;
+        let trials_per_task = spec.generate.trials_per_task;
+        let task = &self.tasks[(index / trials_per_task) as usize];
+        let trial = trial(spec.seed, "demonstration", task, index % trials_per_task, spec.generate.counts);
+        let config = simulation_config(spec.generate.frames, &spec.generate.simulation);
+        demonstrate(task, &trial, u64::from(index), &config)
+    }
 }
 
 /// The physics' settings with what a recording shall hold.

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::artifact::{FileEntry, IoError, Plan, Receipt};
+use crate::artifact::StageDir;
 use crate::model;
 use crate::pipeline::costs::Costs;
 use crate::pipeline::filmstrips::{self, Rollouts};
-use crate::pipeline::runner::{Context, Options, Part, Unit};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train};
+use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train, upstream};
 use crate::render::{CameraConfig, Randomization};
 use crate::report::{
     self, DetectionsInput, Fact, Filmstrip, MetricsInput, ModelParts, ModelSummary, ReportInputs, RolloutsInput,
@@ -19,135 +19,134 @@ use crate::rollout::ModelFacts;
 use crate::task::Split;
 use crate::training::METRICS_FILE;
 
+/// Raised when a report says something else of the same results.
+const VERSION: u32 = 5;
 /// What a report holds.
 const FILES: [&str; 5] = ["report.json", "report.md", "results.csv", "curves.csv", "index.html"];
-/// Version of what a report says, beside that of the program.
-const VERSION: u32 = 4;
 
-pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
-    let mut inputs = BTreeMap::new();
-    for unit in rollout::units(context)? {
-        inputs.insert(unit.name.clone(), unit.dir.version()?);
+/// The report of an experiment, or of all of a study.
+pub(super) struct Report<'p> {
+    title: &'p str,
+    /// Whether each experiment has a folder of its name below the run directory.
+    is_study: bool,
+    experiments: Vec<&'p Pipeline>,
+}
+
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Report<'_>> {
+    let title = pipeline.spec.report.title.as_deref().unwrap_or(&pipeline.spec.name);
+    vec![Report { title, is_study: false, experiments: vec![pipeline] }]
+}
+
+/// The one report of a study.
+pub(super) fn of_study(study: &Study) -> Report<'_> {
+    Report { title: study.title(), is_study: true, experiments: study.experiments.iter().collect() }
+}
+
+impl<'p> Report<'p> {
+    /// The experiments with their run directories.
+    fn runs(&self, run: &RunDir) -> Vec<(&'p Pipeline, RunDir)> {
+        let own = |pipeline: &Pipeline| if self.is_study { run.experiment(&pipeline.spec.name) } else { run.clone() };
+        self.experiments.iter().map(|&pipeline| (pipeline, own(pipeline))).collect()
     }
-    Ok(vec![unit(title(context.pipeline), context.dir, inputs)])
 }
 
-pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let mut inputs = ReportInputs { title: title(context.pipeline).to_owned(), ..ReportInputs::default() };
-    gather(context, context.dir, &mut inputs)?;
-    write(unit, inputs)
-}
+impl Unit for Report<'_> {
+    fn stage(&self) -> Stage {
+        Stage::Report
+    }
 
-/// The one unit of a study's own report.
-pub(super) fn study_units(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<Unit>, PipelineError> {
-    let mut inputs = BTreeMap::new();
-    for pipeline in &study.experiments {
-        let context = Context { pipeline, dir: &dir.experiment(&pipeline.spec.name), options };
-        for unit in rollout::units(&context)? {
-            inputs.insert(format!("{}: {}", pipeline.spec.name, unit.name), unit.dir.version()?);
+    fn stage_version(&self) -> u32 {
+        VERSION
+    }
+
+    fn name(&self) -> String {
+        Stage::Report.name().to_owned()
+    }
+
+    fn dir(&self, run: &RunDir) -> StageDir {
+        run.report()
+    }
+
+    fn amount(&self, _shard: u32) -> Amount {
+        Amount { count: self.experiments.len() as u64, of: "experiments" }
+    }
+
+    fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+        let mut inputs = BTreeMap::new();
+        for (pipeline, run) in self.runs(run) {
+            let experiment = if self.is_study { format!("{}: ", pipeline.spec.name) } else { String::new() };
+            for unit in rollout::units(pipeline) {
+                inputs.insert(format!("{experiment}{}", unit.name()), unit.dir(&run).version()?);
+            }
         }
+        Ok(inputs)
     }
-    Ok(vec![unit(study.title(), dir, inputs)])
-}
 
-pub(super) fn work_study(study: &Study, dir: &RunDir, options: &Options, unit: &Unit) -> Result<(), PipelineError> {
-    let mut inputs = ReportInputs { title: study.title().to_owned(), ..ReportInputs::default() };
-    for pipeline in &study.experiments {
-        let own = dir.experiment(&pipeline.spec.name);
-        gather(&Context { pipeline, dir: &own, options }, dir, &mut inputs)?;
+    fn settings(&self) -> Value {
+        json!({ "title": self.title })
     }
-    write(unit, inputs)
+
+    fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+        let mut inputs =
+            ReportInputs { title: self.title.to_owned(), paper: paper_values(), ..ReportInputs::default() };
+        for (pipeline, run) in self.runs(job.context.dir) {
+            gather(pipeline, &run, &mut inputs)?;
+            inputs.filmstrips.extend(filmstrips(pipeline, &run, job.context.dir)?);
+        }
+        inputs.commits.sort();
+        inputs.commits.dedup();
+        Ok(Box::new(Reporter { inputs, job }))
+    }
 }
 
-fn title(pipeline: &Pipeline) -> &str {
-    pipeline.spec.report.title.as_deref().unwrap_or(&pipeline.spec.name)
+/// Makes a report.
+struct Reporter<'j> {
+    inputs: ReportInputs,
+    job: &'j Job<'j>,
 }
 
-fn unit(title: &str, dir: &RunDir, inputs: BTreeMap<String, String>) -> Unit {
-    let plan = Plan::new(Stage::Report.name(), 1, inputs, json!({ "title": title, "version": VERSION }));
-    Unit { name: Stage::Report.name().to_owned(), dir: dir.report(), plan, part: Part::Whole }
+impl Worker for Reporter<'_> {
+    fn shard(&self, _shard: u32) -> Result<Option<Made>, PipelineError> {
+        report::make(&self.inputs, self.job.dir.path())?;
+        Ok(Some(Made::files(&self.job.dir, FILES)?))
+    }
 }
 
-fn write(unit: &Unit, mut inputs: ReportInputs) -> Result<(), PipelineError> {
-    inputs.paper = paper_values();
-    inputs.commits.sort();
-    inputs.commits.dedup();
-    unit.dir.begin(&unit.plan)?;
-    report::make(&inputs, unit.dir.path())?;
-    let entries: Result<Vec<FileEntry>, IoError> =
-        FILES.iter().map(|file| FileEntry::of(unit.dir.path(), file)).collect();
-    unit.dir.commit_shard(&Receipt { plan_id: unit.plan.id(), shard: 0, episodes: 0, failed: 0, files: entries? })?;
-    unit.dir.commit(&unit.plan, &[])?;
-    Ok(())
-}
-
-/// Adds all that is known of one experiment; `run` is the run directory of the report.
-fn gather(context: &Context<'_>, run: &RunDir, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
-    let experiment = &context.pipeline.spec.name;
-    let rollouts = rollout::units(context)?;
-    inputs.rollouts.extend(rollouts.iter().map(|unit| RolloutsInput {
-        experiment: experiment.clone(),
-        tag: tag_of(context, unit),
-        path: unit.dir.path().join(rollout::TABLE),
-    }));
-    for unit in &rollouts {
-        if unit.dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
-            let path = unit.dir.path().join(detections::TABLE);
+/// Adds all that is known of one experiment.
+fn gather(pipeline: &Pipeline, run: &RunDir, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
+    let experiment = &pipeline.spec.name;
+    for unit in rollout::units(pipeline) {
+        let dir = unit.dir(run);
+        inputs.rollouts.push(RolloutsInput {
+            experiment: experiment.clone(),
+            tag: unit.actor.and_then(|actor| actor.model.spec.tag.clone()),
+            path: dir.path().join(rollout::TABLE),
+        });
+        if dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
+            let path = dir.path().join(detections::TABLE);
             inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
         }
     }
-    inputs.filmstrips.extend(filmstrips(context, run, &rollouts)?);
-    let costs = Costs::read(context.dir)?;
-    inputs.metrics.extend(trainings(context, &costs)?);
-    inputs.facts.extend(facts(context)?);
-    inputs.costs.extend(stage_costs(context, &costs, &mut inputs.commits)?);
+    let costs = Costs::read(run)?;
+    inputs.metrics.extend(trainings(pipeline, run, &costs)?);
+    inputs.facts.extend(facts(pipeline, run)?);
+    inputs.costs.extend(stage_costs(pipeline, run, &costs, &mut inputs.commits)?);
     Ok(())
 }
 
-/// Strips of what models acted; of the oracle only where there is nothing else.
-fn filmstrips(context: &Context<'_>, run: &RunDir, rollouts: &[Unit]) -> Result<Vec<Filmstrip>, PipelineError> {
-    let (task_set, _) = tasks::read(context)?;
-    let spec = &context.pipeline.spec;
-    let of_unit = |unit: &Unit| {
-        let Part::Suite { actor, suite } = unit.part else { return None };
-        let place = unit.dir.path().strip_prefix(run.root()).unwrap_or(unit.dir.path()).display().to_string();
-        let actor = rollout::actor_name(context, actor);
-        Some(Rollouts { suite: spec.rollout.suites[suite].name.clone(), actor, dir: unit.dir.clone(), place })
+/// Strips of what models acted; of the oracle only where there is nothing else. `whole` is the run directory of the
+/// report.
+fn filmstrips(pipeline: &Pipeline, run: &RunDir, whole: &RunDir) -> Result<Vec<Filmstrip>, PipelineError> {
+    let of_unit = |unit: rollout::Suite<'_>| {
+        let dir = unit.dir(run);
+        let place = dir.path().strip_prefix(whole.root()).unwrap_or(dir.path()).display().to_string();
+        Rollouts { suite: unit.spec.name.clone(), actor: unit.actor_name(), dir, place }
     };
-    let is_model = |unit: &&Unit| !matches!(unit.part, Part::Suite { actor: None, .. });
-    let (models, oracle): (Vec<&Unit>, Vec<&Unit>) = rollouts.iter().partition(is_model);
+    let (models, oracle): (Vec<_>, Vec<_>) =
+        rollout::units(pipeline).into_iter().partition(|unit| unit.actor.is_some());
     let shown = if models.is_empty() { oracle } else { models };
-    let shown: Vec<Rollouts> = shown.into_iter().filter_map(of_unit).collect();
-    filmstrips::of_experiment(&spec.name, &task_set, &shown)
-}
-
-/// The tag of the model that acts in a unit of the rollout stage.
-fn tag_of(context: &Context<'_>, unit: &Unit) -> Option<String> {
-    let Part::Suite { actor: Some(actor), .. } = unit.part else { return None };
-    context.pipeline.spec.models[actor.model].tag.clone()
-}
-
-fn trainings(context: &Context<'_>, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
-    let (task_set, _) = tasks::read(context)?;
-    let n_seen = task_set.of_split(Split::Seen).count() as u32;
-    let mut trainings = Vec::new();
-    for unit in train::units(context)? {
-        let Part::Model { model, seed } = unit.part else { continue };
-        let spec = &context.pipeline.spec.models[model];
-        let model = ModelSummary {
-            experiment: context.pipeline.spec.name.clone(),
-            variant: spec.variant.name(),
-            parts: parts(ModelFacts::from(spec.variant)),
-            tag: spec.tag.clone(),
-            train_tasks: i64::from(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
-            specification: spec.specification().name().to_owned(),
-            seed: seed as i64,
-            parameters: model::inspect(unit.dir.path())?.parameters as u64,
-            cpu_secs: costs.of(&unit.name, &unit.plan).map(|cost| cost.cpu_secs),
-        };
-        trainings.push(MetricsInput { model, path: unit.dir.path().join(METRICS_FILE) });
-    }
-    Ok(trainings)
+    let shown: Vec<Rollouts> = shown.into_iter().map(of_unit).collect();
+    filmstrips::of_experiment(&pipeline.spec.name, &tasks::read(run)?, &shown)
 }
 
 fn parts(facts: ModelFacts) -> ModelParts {
@@ -156,36 +155,62 @@ fn parts(facts: ModelFacts) -> ModelParts {
     ModelParts { core, scoping, encoder }
 }
 
-/// What the stages before the report took, as far as it was measured under the plans that hold now.
+fn trainings(pipeline: &Pipeline, run: &RunDir, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
+    let mut trainings = Vec::new();
+    for unit in train::units(pipeline) {
+        let (spec, dir) = (unit.spec, unit.dir(run));
+        let plan = dir.plan()?;
+        let model = ModelSummary {
+            experiment: pipeline.spec.name.clone(),
+            variant: spec.variant.name(),
+            parts: parts(ModelFacts::from(spec.variant)),
+            tag: spec.tag.clone(),
+            train_tasks: i64::from(unit.train_tasks()),
+            specification: spec.specification().name().to_owned(),
+            seed: unit.seed as i64,
+            parameters: model::inspect(dir.path())?.parameters as u64,
+            cpu_secs: plan.and_then(|plan| costs.of(&unit.name(), &plan)).map(|cost| cost.cpu_secs),
+        };
+        trainings.push(MetricsInput { model, path: dir.path().join(METRICS_FILE) });
+    }
+    Ok(trainings)
+}
+
+/// What the stages before the report took; nothing of a stage of which a part was not measured.
 fn stage_costs(
-    context: &Context<'_>,
+    pipeline: &Pipeline,
+    run: &RunDir,
     costs: &Costs,
     commits: &mut Vec<String>,
 ) -> Result<Vec<StageCost>, PipelineError> {
     let mut told = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|&stage| stage != Stage::Report) {
-        let units = super::runner::units(context, stage)?;
-        let known: Vec<_> = units.iter().filter_map(|unit| costs.of(&unit.name, &unit.plan)).collect();
-        if known.is_empty() {
-            continue;
+        let units = upstream::units(pipeline, stage);
+        let mut known = Vec::new();
+        for unit in &units {
+            let plan = unit.dir(run).plan()?;
+            known.extend(plan.and_then(|plan| costs.of(&unit.name(), &plan)));
         }
         commits.extend(known.iter().filter_map(|cost| cost.commit.clone()));
+        let is_known = known.len() == units.len();
+        let sum = |of: fn(&super::costs::UnitCost) -> f64| is_known.then(|| known.iter().map(of).sum());
         told.push(StageCost {
-            experiment: context.pipeline.spec.name.clone(),
+            experiment: pipeline.spec.name.clone(),
             stage: stage.name().to_owned(),
-            cpu_secs: known.iter().map(|cost| cost.cpu_secs).sum(),
-            wall_secs: known.iter().map(|cost| cost.wall_secs).sum(),
+            cpu_secs: sum(|cost| cost.cpu_secs),
+            wall_secs: sum(|cost| cost.wall_secs),
         });
     }
-    Ok(told)
+    let is_measured = told.iter().any(|cost| cost.cpu_secs.is_some());
+    Ok(if is_measured { told } else { Vec::new() })
 }
 
 /// What a reader wants to know of an experiment beside its results.
-fn facts(context: &Context<'_>) -> Result<Vec<Fact>, PipelineError> {
-    let spec = &context.pipeline.spec;
-    let (task_set, _) = tasks::read(context)?;
-    let recordings = context.dir.recordings().finished()?;
-    let dataset = context.dir.dataset().finished()?;
+fn facts(pipeline: &Pipeline, run: &RunDir) -> Result<Vec<Fact>, PipelineError> {
+    let spec = &pipeline.spec;
+    let task_set = tasks::read(run)?;
+    let recordings = run.recordings().finished()?;
+    let dataset = run.dataset().finished()?;
     let fact = |name: &str, value: String| Fact { experiment: spec.name.clone(), name: name.to_owned(), value };
     let mut facts = vec![
         fact("run seed", spec.seed.to_string()),

@@ -122,6 +122,10 @@ impl Pipeline {
         if generate.trials_per_task == 0 {
             return Err(self.value("generate.trials_per_task", "is 0; at least 1 is needed"));
         }
+        if generate.trials_per_task.checked_mul(self.spec.tasks.train).is_none() {
+            let problem = format!("is {}; allowed are 4294967295 episodes in all", generate.trials_per_task);
+            return Err(self.value("generate.trials_per_task", problem));
+        }
         if generate.episodes_per_shard == 0 {
             return Err(self.value("generate.episodes_per_shard", "is 0; at least 1 is needed"));
         }

@@ -1,22 +1,24 @@
 //! Stage `rollout`: every model acts every suite, shard by shard, in physics.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::artifact::{FileEntry, Plan, Receipt};
+use crate::artifact::{FileEntry, Manifest, StageDir};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::filmstrips::MOST_FAILURES;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
-use crate::pipeline::layout::model_name;
-use crate::pipeline::runner::{Context, ModelActor, Part, Unit};
+use crate::pipeline::recorded::RolloutSettings;
+use crate::pipeline::train::{self, Model};
 use crate::pipeline::trials::trial;
-use crate::pipeline::{OrderSpec, PipelineError, RecordedFrames, Stage, SuiteSpec, detections, facts, tasks};
-use crate::progress::Progress;
+use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::{
+    OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, SuiteSpec, detections, facts, tasks,
+};
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
@@ -28,6 +30,8 @@ use crate::sim::Simulation;
 use crate::task::{Split, Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
+/// Raised when the same settings act otherwise, or tell more of it.
+const VERSION: u32 = 2;
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
 /// How the paths of a shard's tables begin.
@@ -36,106 +40,147 @@ const DETECTIONS_PART: &str = "parts/detections-";
 /// One row an episode, all shards together.
 pub(super) const TABLE: &str = "rollouts.parquet";
 
-pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
-    let (_, task_inputs) = tasks::read(context)?;
-    let spec = &context.pipeline.spec;
-    let mut units = Vec::new();
-    for actor in actors(context) {
-        let inputs = match actor {
-            Some(actor) => model_inputs(context, actor, &task_inputs)?,
-            None => task_inputs.clone(),
-        };
-        let name = actor_name(context, actor);
-        for (suite, suite_spec) in spec.rollout.suites.iter().enumerate() {
-            if actor.is_some_and(|actor| !spec.models[actor.model].acts(&suite_spec.name)) {
-                continue;
-            }
-            let mut config = json!({
-                "seed": spec.seed,
-                "suite": suite_spec,
-                "decoder": actor.map(|actor| actor.decoder),
-                "record": spec.rollout.record,
-                "cameras": spec.generate.cameras,
-                "decisions_factor": spec.rollout.decisions_factor,
-                "simulation": spec.generate.simulation,
-            });
-            if let Some(tasks) = trained_on(context, actor, suite_spec) {
-                config["trained_on"] = json!(tasks);
-            }
-            let shards = suite_spec.episodes.div_ceil(EPISODES_PER_SHARD);
-            units.push(Unit {
-                name: format!("rollout {name} {}", suite_spec.name),
-                dir: context.dir.rollouts(&name, &suite_spec.name),
-                plan: Plan::new(Stage::Rollout.name(), shards, inputs.clone(), config),
-                part: Part::Suite { actor, suite },
-            });
-        }
+/// A suite acted by a model, or by the oracle.
+pub(super) struct Suite<'p> {
+    pipeline: &'p Pipeline,
+    /// `None` for the oracle.
+    pub(super) actor: Option<ModelActor<'p>>,
+    pub(super) spec: &'p SuiteSpec,
+}
+
+/// A trained model with a way to decode.
+#[derive(Clone, Copy)]
+pub(super) struct ModelActor<'p> {
+    pub(super) model: Model<'p>,
+    decoder: Decoder,
+}
+
+/// Every suite of the oracle, where it is asked for, then of every model with each of its seeds and decoders.
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Suite<'_>> {
+    let oracle = pipeline.spec.rollout.oracle.then_some(None);
+    let models = train::units(pipeline).into_iter();
+    let actors =
+        models.flat_map(|model| model.spec.decoders.iter().map(move |&decoder| Some(ModelActor { model, decoder })));
+    oracle.into_iter().chain(actors).flat_map(|actor| acted(pipeline, actor)).collect()
+}
+
+/// The suites that an actor acts.
+fn acted<'p>(pipeline: &'p Pipeline, actor: Option<ModelActor<'p>>) -> impl Iterator<Item = Suite<'p>> {
+    let acts = move |suite: &&SuiteSpec| actor.is_none_or(|actor| actor.model.spec.acts(&suite.name));
+    pipeline.spec.rollout.suites.iter().filter(acts).map(move |spec| Suite { pipeline, actor, spec })
+}
+
+impl Suite<'_> {
+    /// The folder of the actor's rollouts.
+    pub(super) fn actor_name(&self) -> String {
+        let Some(ModelActor { model, decoder }) = self.actor else { return "oracle".to_owned() };
+        format!("{}-{}", model.folder_name(), decoder.name())
     }
-    Ok(units)
-}
 
-/// The oracle (`None`) where it is asked for, and every trained model with each of its decoders.
-fn actors(context: &Context<'_>) -> Vec<Option<ModelActor>> {
-    let spec = &context.pipeline.spec;
-    let mut actors = if spec.rollout.oracle { vec![None] } else { Vec::new() };
-    for (model, model_spec) in spec.models.iter().enumerate() {
-        for &seed in &model_spec.seeds {
-            actors.extend(model_spec.decoders.iter().map(|&decoder| Some(ModelActor { model, seed, decoder })));
-        }
+    /// How many of the suite's tasks the actor may be asked for: of the seen ones those that its model was trained on.
+    /// `None` for all.
+    fn trained_on(&self) -> Option<usize> {
+        let train_tasks = self.actor?.model.spec.train_tasks?;
+        (self.spec.split == Split::Seen).then_some(train_tasks as usize)
     }
-    actors
+
+    /// The episodes of a shard.
+    fn episodes(&self, shard: u32) -> Range<u32> {
+        let end = shard.saturating_add(1).saturating_mul(EPISODES_PER_SHARD);
+        shard.saturating_mul(EPISODES_PER_SHARD).min(self.spec.episodes)..end.min(self.spec.episodes)
+    }
 }
 
-/// The folder of an actor's rollouts.
-pub(super) fn actor_name(context: &Context<'_>, actor: Option<ModelActor>) -> String {
-    let Some(ModelActor { model, seed, decoder }) = actor else { return "oracle".to_owned() };
-    let spec = &context.pipeline.spec.models[model];
-    format!("{}-{}", model_name(spec, seed), decoder.name())
+impl Unit for Suite<'_> {
+    fn stage(&self) -> Stage {
+        Stage::Rollout
+    }
+
+    fn stage_version(&self) -> u32 {
+        VERSION
+    }
+
+    fn name(&self) -> String {
+        format!("rollout {} {}", self.actor_name(), self.spec.name)
+    }
+
+    fn dir(&self, run: &RunDir) -> StageDir {
+        run.rollouts(&self.actor_name(), &self.spec.name)
+    }
+
+    fn shards(&self) -> u32 {
+        self.spec.episodes.div_ceil(EPISODES_PER_SHARD)
+    }
+
+    fn amount(&self, shard: u32) -> Amount {
+        Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
+    }
+
+    fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+        let mut inputs = tasks::version(run)?;
+        if let Some(actor) = self.actor {
+            inputs.insert(Stage::Train.name().to_owned(), actor.model.dir(run).version()?);
+        }
+        Ok(inputs)
+    }
+
+    fn settings(&self) -> Value {
+        let spec = &self.pipeline.spec;
+        json!(RolloutSettings {
+            seed: spec.seed,
+            suite: self.spec.clone(),
+            decoder: self.actor.map(|actor| actor.decoder),
+            record: spec.rollout.record,
+            cameras: spec.generate.cameras.clone(),
+            decisions_factor: spec.rollout.decisions_factor,
+            simulation: spec.generate.simulation.clone(),
+            trained_on: self.trained_on(),
+        })
+    }
+
+    fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+        let task_set = tasks::read(job.context.dir)?;
+        let tasks = suite_tasks(self.pipeline, &task_set, self.spec, self.trained_on())?;
+        let learned = self.actor.map(|actor| learned(job.context.dir, actor));
+        Ok(Box::new(Acting { pipeline: self.pipeline, unit: self, spec: self.spec, job, tasks, learned }))
+    }
+
+    /// Puts the shards' rows into one table.
+    fn gather(&self, job: &Job<'_>) -> Result<Vec<&'static str>, PipelineError> {
+        let mut rows = RolloutRows::default();
+        let mut detections: Option<DetectionRows> = None;
+        for shard in 0..job.plan.shards {
+            for file in job.receipt(shard)?.iter().flat_map(|receipt| &receipt.files) {
+                let path = job.dir.path().join(&file.path);
+                if file.path.starts_with(PART) {
+                    rows.append(RolloutRows::read(&path)?);
+                } else if file.path.starts_with(DETECTIONS_PART) {
+                    detections.get_or_insert_default().append(DetectionRows::read(&path)?);
+                }
+            }
+        }
+        rows.write(&job.dir.path().join(TABLE))?;
+        let mut tables = vec![TABLE];
+        if let Some(detections) = detections {
+            detections.write(&job.dir.path().join(detections::TABLE))?;
+            tables.push(detections::TABLE);
+        }
+        Ok(tables)
+    }
+
+    fn told(&self, manifest: &Manifest) -> String {
+        format!("{} of {} succeeded", manifest.episodes - manifest.failed, manifest.episodes)
+    }
 }
 
-fn model_inputs(
-    context: &Context<'_>,
-    actor: ModelActor,
-    task_inputs: &BTreeMap<String, String>,
-) -> Result<BTreeMap<String, String>, PipelineError> {
-    let spec = &context.pipeline.spec.models[actor.model];
-    let version = context.dir.model(&model_name(spec, actor.seed)).version()?;
-    let mut inputs = task_inputs.clone();
-    inputs.insert(Stage::Train.name().to_owned(), version);
-    Ok(inputs)
-}
-
-/// How many of a suite's tasks an actor may be asked for: of the seen ones those that its model was trained on. `None`
-/// for all.
-fn trained_on(context: &Context<'_>, actor: Option<ModelActor>, suite: &SuiteSpec) -> Option<usize> {
-    let train_tasks = context.pipeline.spec.models[actor?.model].train_tasks?;
-    (suite.split == Split::Seen).then_some(train_tasks as usize)
-}
-
-/// What a unit's shards share.
-struct Suite<'a> {
-    context: &'a Context<'a>,
-    unit: &'a Unit,
-    spec: &'a SuiteSpec,
+/// Acts the shards of a suite.
+struct Acting<'j> {
+    pipeline: &'j Pipeline,
+    unit: &'j Suite<'j>,
+    spec: &'j SuiteSpec,
+    job: &'j Job<'j>,
     tasks: Vec<Task>,
     learned: Option<Learned>,
-}
-
-pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let Part::Suite { actor, suite } = unit.part else { return Ok(()) };
-    let (task_set, _) = tasks::read(context)?;
-    let spec = &context.pipeline.spec.rollout.suites[suite];
-    let learned = actor.map(|actor| learned(context, actor, &task_set));
-    let tasks = suite_tasks(context, &task_set, spec, trained_on(context, actor, spec))?;
-    let suite = Suite { context, unit, spec, tasks, learned };
-    unit.dir.begin(&unit.plan)?;
-    let progress = context.progress(unit, u64::from(spec.episodes), "episodes");
-    let shards = context.shards(unit)?;
-    shards.into_par_iter().try_for_each(|shard| suite.shard(shard, &progress))?;
-    if context.options.shard.is_none() {
-        finish(unit, &progress)?;
-    }
-    Ok(())
 }
 
 /// Where a trained model lies and how it decodes. Each shard loads its own: a policy keeps what it has read of
@@ -150,19 +195,16 @@ struct Learned {
     acted: Acted,
 }
 
-fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Learned {
-    let ModelActor { model, seed, decoder } = actor;
-    let spec = &context.pipeline.spec.models[model];
-    let n_seen = task_set.of_split(Split::Seen).count() as u32;
+fn learned(run: &RunDir, ModelActor { model, decoder }: ModelActor<'_>) -> Learned {
+    let spec = model.spec;
     let acted = Acted {
-        training_seed: seed,
-        train_tasks: Some(spec.train_tasks.map_or(n_seen, |n| n.min(n_seen))),
+        training_seed: model.seed,
+        train_tasks: Some(model.train_tasks()),
         specification: Some(spec.specification().name()),
         decoder: Some(decoder.name()),
         model: Some(ModelFacts::from(spec.variant)),
     };
-    let name = model_name(spec, seed);
-    let folder = context.dir.model(&name).path().to_owned();
+    let folder = model.dir(run).path().to_owned();
     let is_first = spec.decoders.first() == Some(&decoder);
     Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, is_first, acted }
 }
@@ -170,12 +212,12 @@ fn learned(context: &Context<'_>, actor: ModelActor, task_set: &TaskSet) -> Lear
 impl Learned {
     /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
     /// another variant.
-    fn policy(&self, context: &Context<'_>) -> Result<Box<dyn Policy>, PipelineError> {
+    fn policy(&self, pipeline: &Pipeline) -> Result<Box<dyn Policy>, PipelineError> {
         let found = load_config(&self.folder)?;
-        let family = context.pipeline.spec.tasks.family;
+        let family = pipeline.spec.tasks.family;
         let mut wanted =
             ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
-        if let Some(camera) = context.pipeline.spec.generate.cameras.first() {
+        if let Some(camera) = pipeline.spec.generate.cameras.first() {
             wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, wanted.n_slots);
         }
         check_purpose(&found, &wanted, &self.folder)?;
@@ -184,19 +226,19 @@ impl Learned {
 }
 
 /// What a suite's demonstrations depend on; policies read their boundaries.
-fn demonstrations<'a>(context: &Context<'a>, suite: &'a SuiteSpec) -> Demonstrations<'a> {
-    let spec = &context.pipeline.spec;
+fn demonstrations<'a>(pipeline: &'a Pipeline, suite: &'a SuiteSpec) -> Demonstrations<'a> {
+    let spec = &pipeline.spec;
     Demonstrations { seed: spec.seed, suite, simulation: &spec.generate.simulation, frames: RecordedFrames::Boundaries }
 }
 
 /// The tasks that a suite asks for, in its order of sub-tasks; of the first `most` of its split.
 fn suite_tasks(
-    context: &Context<'_>,
+    pipeline: &Pipeline,
     task_set: &TaskSet,
     spec: &SuiteSpec,
     most: Option<usize>,
 ) -> Result<Vec<Task>, PipelineError> {
-    let demonstrations = demonstrations(context, spec);
+    let demonstrations = demonstrations(pipeline, spec);
     let ordered = |task: &Task| demonstrations.ordered(task);
     let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
     let tasks: Vec<Task> = task_set
@@ -212,7 +254,7 @@ fn suite_tasks(
             (OrderSpec::Own, None) => ("split", format!("is {}, but there is no such task", spec.split)),
         };
         return Err(PipelineError::Value {
-            path: context.pipeline.path.clone(),
+            path: pipeline.path.clone(),
             key: format!("rollout.suites.{}.{field}", spec.name),
             problem,
         });
@@ -220,86 +262,50 @@ fn suite_tasks(
     Ok(tasks)
 }
 
-/// Puts the shards' rows into one table and commits.
-fn finish(unit: &Unit, progress: &Progress) -> Result<(), PipelineError> {
-    let mut rows = RolloutRows::default();
-    let mut detections: Option<DetectionRows> = None;
-    for shard in 0..unit.plan.shards {
-        if let Some(receipt) = unit.dir.receipt(&unit.plan, shard)? {
-            for file in &receipt.files {
-                let path = unit.dir.path().join(&file.path);
-                if file.path.starts_with(PART) {
-                    rows.append(RolloutRows::read(&path)?);
-                } else if file.path.starts_with(DETECTIONS_PART) {
-                    detections.get_or_insert_default().append(DetectionRows::read(&path)?);
-                }
-            }
-        }
-    }
-    rows.write(&unit.dir.path().join(TABLE))?;
-    let mut tables = vec![TABLE];
-    if let Some(detections) = detections {
-        detections.write(&unit.dir.path().join(detections::TABLE))?;
-        tables.push(detections::TABLE);
-    }
-    let manifest = unit.dir.commit(&unit.plan, &tables)?;
-    let succeeded = manifest.episodes - manifest.failed;
-    progress.finish(&format!("{succeeded} of {} succeeded", manifest.episodes));
-    Ok(())
-}
-
-impl Suite<'_> {
-    /// Does one shard unless its receipt is there.
-    fn shard(&self, shard: u32, progress: &Progress) -> Result<(), PipelineError> {
-        let Self { context, unit, spec, .. } = self;
-        let range = shard * EPISODES_PER_SHARD..spec.episodes.min((shard + 1) * EPISODES_PER_SHARD);
-        if unit.dir.receipt(&unit.plan, shard)?.is_some() {
-            progress.inc(u64::from(range.end - range.start));
-            return Ok(());
-        }
-        context.go_on()?;
-        let starts: Result<Vec<Start<'_>>, PipelineError> = range.clone().map(|episode| self.start(episode)).collect();
+impl Worker for Acting<'_> {
+    fn shard(&self, shard: u32) -> Result<Option<Made>, PipelineError> {
+        let Self { unit, spec, job, .. } = self;
+        let folder = job.dir.path();
+        let starts: Result<Vec<Start<'_>>, PipelineError> =
+            unit.episodes(shard).map(|episode| self.start(episode)).collect();
         let starts = starts?;
         let mut policy = self.policy(&starts)?;
         let by = self.learned.as_ref().map(|learned| learned.acted.clone()).unwrap_or_default();
         let detections = self.detections(policy.as_ref(), &by, &starts)?;
         let acted = self.act(policy.as_mut(), starts)?;
+        if job.is_done(shard)? {
+            return Ok(None);
+        }
         let part = format!("{PART}{shard:05}.parquet");
-        RolloutRows::of(&spec.name, &facts::of_suite(&context.pipeline.spec, spec), &by, &acted)
-            .write(&unit.dir.path().join(&part))?;
-        let mut files = vec![FileEntry::of(unit.dir.path(), &part)?];
+        let suite = facts::of_suite(&self.pipeline.spec, spec);
+        RolloutRows::of(&spec.name, &suite, &by, &acted).write(&folder.join(&part))?;
+        let mut files = vec![FileEntry::of(folder, &part)?];
         if let Some(detections) = detections {
             let part = format!("{DETECTIONS_PART}{shard:05}.parquet");
-            detections.write(&unit.dir.path().join(&part))?;
-            files.push(FileEntry::of(unit.dir.path(), &part)?);
+            detections.write(&folder.join(&part))?;
+            files.push(FileEntry::of(folder, &part)?);
         }
         files.extend(self.record(shard, &acted)?);
-        unit.dir.commit_shard(&Receipt {
-            plan_id: unit.plan.id(),
-            shard,
-            episodes: acted.len() as u64,
-            failed: acted.iter().filter(|rollout| !rollout.episode.outcome.is_success()).count() as u64,
-            files,
-        })?;
-        progress.inc(acted.len() as u64);
-        Ok(())
+        let failed = acted.iter().filter(|rollout| !rollout.episode.outcome.is_success()).count() as u64;
+        job.progress.inc(acted.len() as u64);
+        Ok(Some(Made { episodes: acted.len() as u64, failed, files, told: None }))
     }
+}
 
+impl Acting<'_> {
     fn start(&self, episode: u32) -> Result<Start<'_>, PipelineError> {
-        let Self { context, spec, tasks, .. } = self;
+        let Self { pipeline, spec, job, tasks, .. } = self;
+        job.context.go_on()?;
         let task = &tasks[episode as usize % tasks.len()];
         let demonstration = self.demonstration(task, episode)?;
-        let run_seed = context.pipeline.spec.seed;
+        let run_seed = pipeline.spec.seed;
         let mut own = trial(run_seed, &format!("rollout/{}", spec.name), task, episode, spec.on_table);
         if spec.on_table.is_none() {
             own.counts.clone_from(&demonstration.provenance.counts);
         }
-        let recorded = if episode < context.pipeline.spec.rollout.record {
-            RecordedFrames::All
-        } else {
-            RecordedFrames::Boundaries
-        };
-        let config = simulation_config(recorded, &context.pipeline.spec.generate.simulation);
+        let recorded =
+            if episode < pipeline.spec.rollout.record { RecordedFrames::All } else { RecordedFrames::Boundaries };
+        let config = simulation_config(recorded, &pipeline.spec.generate.simulation);
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
         let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
         let sight = self.sight(&demonstration, &world, own.seed)?;
@@ -309,7 +315,7 @@ impl Suite<'_> {
     /// What a model that sees is given: the first camera's pictures, as in the dataset that it learned from.
     fn sight(&self, demonstration: &Episode, world: &Simulation, seed: Seed) -> Result<Option<Sight>, PipelineError> {
         let sees = self.learned.as_ref().is_some_and(|learned| learned.variant.sees());
-        let camera = self.context.pipeline.spec.generate.cameras.first().filter(|_| sees);
+        let camera = self.pipeline.spec.generate.cameras.first().filter(|_| sees);
         let look = |camera| {
             sight(camera, demonstration, world.scene(), seed).map_err(|source| PipelineError::Sight {
                 suite: self.spec.name.clone(),
@@ -323,8 +329,8 @@ impl Suite<'_> {
     }
 
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
-        let Self { context, spec, .. } = self;
-        let found = demonstrations(context, spec).of(task, episode)?;
+        let Self { pipeline, spec, .. } = self;
+        let found = demonstrations(pipeline, spec).of(task, episode)?;
         found.ok_or_else(|| PipelineError::NoDemonstration {
             suite: spec.name.clone(),
             task_id: task.id.clone(),
@@ -334,7 +340,7 @@ impl Suite<'_> {
 
     fn policy(&self, starts: &[Start<'_>]) -> Result<Box<dyn Policy>, PipelineError> {
         Ok(match &self.learned {
-            Some(learned) => learned.policy(self.context)?,
+            Some(learned) => learned.policy(self.pipeline)?,
             None => Box::new(Oracle::for_starts(starts)),
         })
     }
@@ -347,18 +353,18 @@ impl Suite<'_> {
         starts: &[Start<'_>],
     ) -> Result<Option<DetectionRows>, PipelineError> {
         let detects = self.learned.as_ref().is_some_and(|learned| learned.variant.detects() && learned.is_first);
-        let Some(camera) = self.context.pipeline.spec.generate.cameras.first().filter(|_| detects) else {
+        let Some(camera) = self.pipeline.spec.generate.cameras.first().filter(|_| detects) else {
             return Ok(None);
         };
         detections::of_starts(policy, &self.spec.name, by, camera, starts).map_err(|error| self.failed(error.into()))
     }
 
     fn failed(&self, source: RolloutError) -> PipelineError {
-        PipelineError::Rollout { unit: self.unit.name.clone(), source }
+        PipelineError::Rollout { unit: self.unit.name(), source }
     }
 
     fn act(&self, policy: &mut dyn Policy, starts: Vec<Start<'_>>) -> Result<Vec<RolloutEpisode>, PipelineError> {
-        let factor = self.context.pipeline.spec.rollout.decisions_factor;
+        let factor = self.pipeline.spec.rollout.decisions_factor;
         let limits = Limits { decisions_factor: factor, ..Limits::default() };
         rollout::run(policy, starts, limits).map_err(|source| self.failed(source))
     }
@@ -369,20 +375,20 @@ impl Suite<'_> {
         if recorded.is_empty() {
             return Ok(None);
         }
-        let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", self.unit.plan.shards);
-        let plan_json = serde_json::to_string(&self.unit.plan).unwrap_or_default();
-        let writer = ShardWriter::create(&self.unit.dir.path().join(&name), &plan_json)?;
-        let mut writer = writer.with_cameras(&self.context.pipeline.spec.generate.cameras);
+        let (folder, plan) = (self.job.dir.path(), &self.job.plan);
+        let name = format!("recordings/shard-{shard:05}-of-{:05}.mcap", plan.shards);
+        let writer = ShardWriter::create(&folder.join(&name), &self.job.plan_json())?;
+        let mut writer = writer.with_cameras(&self.pipeline.spec.generate.cameras);
         for rollout in recorded {
             writer.write(&rollout.episode)?;
         }
         writer.finish()?;
-        Ok(Some(FileEntry::of(self.unit.dir.path(), &name)?))
+        Ok(Some(FileEntry::of(folder, &name)?))
     }
 
     /// The episodes of a shard that are recorded, in order; none where nothing is to be recorded.
     fn recorded<'e>(&self, shard: u32, acted: &'e [RolloutEpisode]) -> Vec<&'e RolloutEpisode> {
-        let record = self.context.pipeline.spec.rollout.record;
+        let record = self.pipeline.spec.rollout.record;
         let n_first = record.saturating_sub(shard * EPISODES_PER_SHARD) as usize;
         let mut n_failures = if record == 0 { 0 } else { MOST_FAILURES };
         let mut is_recorded = |(at, rollout): &(usize, &RolloutEpisode)| {

@@ -1,143 +1,16 @@
 //! Runs stages in order; skips what is up to date, and says why it does not.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
 
-use serde::Serialize;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use crate::artifact::{ContractError, IoError, Plan, RunLock, StageDir, remove_partials};
-use crate::model::Decoder;
-use crate::pipeline::costs::Costs;
+use crate::artifact::{ContractError, IoError, LockError, Plan, RunLock, remove_partials};
+use crate::pipeline::costs::{Costs, Measured};
+use crate::pipeline::unit::{Context, Job, Made, Unit, Worker};
 use crate::pipeline::{
-    Pipeline, PipelineError, RunDir, Stage, Study, convert, generate, report, rollout, tasks, train,
+    Options, Pipeline, PipelineError, RunDir, Scope, Stage, StageReport, Status, Study, report, shared, upstream,
 };
 use crate::progress::Stopwatch;
-
-/// What the command line chooses.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// First stage.
-    pub from: Stage,
-    /// Last stage.
-    pub to: Stage,
-    /// Threads.
-    pub jobs: usize,
-    /// Only say what would be done.
-    pub dry_run: bool,
-    /// Do again what is up to date.
-    pub force: bool,
-    /// Only this shard of a stage that has shards.
-    pub shard: Option<u32>,
-    /// Whether progress is shown on stderr.
-    pub progress: bool,
-    /// Of which commit the pipeline file is, for the costs.
-    pub commit: Option<String>,
-    /// Which experiment of a study is run; `None` for one by itself.
-    pub experiment: Option<String>,
-    /// Set when the user presses Ctrl-C.
-    pub stop: Arc<AtomicBool>,
-}
-
-/// What came of one unit of a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Nothing to do.
-    UpToDate,
-    /// Done now.
-    Done,
-    /// Would be done (with `--dry-run`).
-    Needed,
-}
-
-/// What came of one unit of a stage, for people and for `--json`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct StageReport {
-    /// Which experiment of a study; `None` for one by itself, and for the study's own report.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub experiment: Option<String>,
-    /// The stage.
-    pub stage: Stage,
-    /// Which of its units: a model, a model's suite, or the stage's own name.
-    pub unit: String,
-    /// What came of it.
-    pub status: Status,
-    /// Why it was or would be done; `up to date` otherwise.
-    pub reason: String,
-    /// Episodes it holds.
-    pub episodes: u64,
-    /// How many of them failed.
-    pub failed: u64,
-}
-
-/// One thing a stage makes: a folder by a plan.
-pub(super) struct Unit {
-    pub(super) name: String,
-    pub(super) dir: StageDir,
-    pub(super) plan: Plan,
-    pub(super) part: Part,
-}
-
-/// Which unit of its stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// The only one.
-    Whole,
-    /// A model, by its place in the pipeline file and its seed.
-    Model { model: usize, seed: u64 },
-    /// A suite acted by a model, or by the oracle.
-    Suite { actor: Option<ModelActor>, suite: usize },
-}
-
-/// A trained model with a way to decode: who acts a suite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ModelActor {
-    /// Its place in the pipeline file.
-    pub(super) model: usize,
-    /// The seed of its training.
-    pub(super) seed: u64,
-    /// How it decodes scopes.
-    pub(super) decoder: Decoder,
-}
-
-/// What every stage is given.
-pub(super) struct Context<'a> {
-    pub(super) pipeline: &'a Pipeline,
-    pub(super) dir: &'a RunDir,
-    pub(super) options: &'a Options,
-}
-
-impl Context<'_> {
-    /// Fails once the user has pressed Ctrl-C.
-    pub(super) fn go_on(&self) -> Result<(), PipelineError> {
-        if self.options.stop.load(Ordering::Relaxed) { Err(PipelineError::Interrupted) } else { Ok(()) }
-    }
-
-    /// The shards of a unit that are to be done: all, or the one that was asked for.
-    pub(super) fn shards(&self, unit: &Unit) -> Result<Vec<u32>, PipelineError> {
-        let n_shards = unit.plan.shards;
-        match self.options.shard {
-            None => Ok((0..n_shards).collect()),
-            Some(shard) if shard < n_shards => Ok(vec![shard]),
-            Some(shard) => Err(PipelineError::Value {
-                path: self.pipeline.path.clone(),
-                key: "--shard".to_owned(),
-                problem: format!("is {shard}; {} has shards 0 to {}", unit.name, n_shards.saturating_sub(1)),
-            }),
-        }
-    }
-
-    /// Progress of one unit.
-    pub(super) fn progress(&self, unit: &Unit, total: u64, what: &str) -> crate::progress::Progress {
-        if self.options.progress {
-            let experiment = self.options.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
-            crate::progress::Progress::new(&format!("{experiment}{}", unit.name), total, what)
-        } else {
-            crate::progress::Progress::hidden()
-        }
-    }
-}
 
 /// Runs the chosen stages.
 ///
@@ -145,19 +18,26 @@ impl Context<'_> {
 ///
 /// The first thing that went wrong; what was committed before stays.
 pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+    check_scope(pipeline, options)?;
     let _lock = lock(dir, options)?;
+    if !options.dry_run && !options.scope.is_shared() {
+        remove_partials(dir.root())?;
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|error| {
         PipelineError::Value { path: pipeline.path.clone(), key: "--jobs".to_owned(), problem: error.to_string() }
     })?;
-    let context = Context { pipeline, dir, options };
+    let context = Context { dir, options };
     let mut reports = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|stage| (options.from..=options.to).contains(stage)) {
-        let done_before = reports.len();
-        pool.install(|| run_stage(&context, stage, &mut reports))?;
-        let shown = &reports[done_before..];
+        let stage_units = units(pipeline, stage);
+        let of_stage = pool.install(|| match options.scope {
+            Scope::Whole => run_units(&context, &pipeline.path, stage_units),
+            _ => shared::run_units(&context, pipeline, stage_units),
+        })?;
         if options.progress && !options.dry_run {
-            shown.iter().filter(|report| report.status == Status::UpToDate).for_each(say_up_to_date);
+            of_stage.iter().filter(|report| report.status == Status::UpToDate).for_each(say_up_to_date);
         }
+        reports.extend(of_stage);
     }
     Ok(reports)
 }
@@ -166,39 +46,67 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
 ///
 /// # Errors
 ///
-/// As [`run`]; [`PipelineError::Value`] for `--shard`, which is of one experiment.
+/// As [`run`]; [`PipelineError::Value`] for items, which are of one experiment.
 pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
-    if options.shard.is_some() {
+    let is_report_alone = options.from == Stage::Report;
+    if options.scope != Scope::Whole && !is_report_alone {
         let problem = "is of one experiment: give its own file, and --out DIR/EXPERIMENT".to_owned();
-        return Err(PipelineError::Value { path: study.path.clone(), key: "--shard".to_owned(), problem });
+        let key = options.scope.option().to_owned();
+        return Err(PipelineError::Value { path: study.path.clone(), key, problem });
     }
-    let _lock = if options.dry_run { None } else { Some(RunLock::take(dir.root())?) };
+    let _lock = lock(dir, options)?;
     let mut reports = Vec::new();
     for pipeline in &study.experiments {
         let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
         reports.extend(run(pipeline, &dir.experiment(&pipeline.spec.name), &options)?);
     }
     if options.to == Stage::Report {
-        let units = report::study_units(study, dir, options);
-        for unit in or_what_comes_first(options, Stage::Report, units, &mut reports)?.unwrap_or_default() {
-            let work = || report::work_study(study, dir, options, &unit);
-            reports.push(run_unit(dir, options, Stage::Report, &unit, work)?);
-        }
+        let own = upstream::boxed(vec![report::of_study(study)]);
+        reports.extend(run_units(&Context { dir, options }, &study.path, own)?);
     }
     Ok(reports)
 }
 
-/// A whole run has its directory alone and clears away what a killed one left; shards may be done side by side.
+/// The units of a stage, in the pipeline file's order.
+pub(super) fn units(pipeline: &Pipeline, stage: Stage) -> Vec<Box<dyn Unit + '_>> {
+    match stage {
+        Stage::Report => upstream::boxed(report::units(pipeline)),
+        stage => upstream::units(pipeline, stage),
+    }
+}
+
+/// Refuses what the chosen stages cannot be asked for.
+fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineError> {
+    let Options { from, to, ref scope, .. } = *options;
+    let problem = match scope {
+        _ if from > to => Some(("--from", format!("is {from}, which comes after --to {to}"))),
+        Scope::Whole => None,
+        scope if from != to => Some((scope.option(), "is of one stage, and this command runs several".to_owned())),
+        Scope::Shard(_) if !to.has_shards() => Some((scope.option(), format!("is of no use to {to}, which has none"))),
+        _ => None,
+    };
+    let Some((key, problem)) = problem else { return Ok(()) };
+    let with_shards = Stage::ALL.into_iter().filter(|stage| stage.has_shards()).map(Stage::name);
+    let allowed = match key {
+        "--from" => "stages run in the order tasks, generate, convert, train, rollout, report".to_owned(),
+        _ => format!("stages with shards are {}", with_shards.collect::<Vec<_>>().join(", ")),
+    };
+    let problem = format!("{problem}; {allowed}");
+    Err(PipelineError::Value { path: pipeline.path.clone(), key: key.to_owned(), problem })
+}
+
+/// A whole run has its directory alone and clears away what a killed one left; items are done side by side.
 fn lock(dir: &RunDir, options: &Options) -> Result<Option<RunLock>, PipelineError> {
     if options.dry_run {
         return Ok(None);
     }
-    if options.shard.is_some() {
-        return Ok(Some(RunLock::share(dir.root())?));
+    if options.scope.is_shared() {
+        return shared::lock(dir, options);
     }
-    let lock = RunLock::take(dir.root())?;
-    remove_partials(dir.root())?;
-    Ok(Some(lock))
+    match RunLock::take(dir.root()) {
+        Err(LockError::Unsupported { .. }) if options.no_lock => Ok(None),
+        lock => Ok(Some(lock?)),
+    }
 }
 
 fn say_up_to_date(report: &StageReport) {
@@ -206,136 +114,137 @@ fn say_up_to_date(report: &StageReport) {
     crate::progress::say(&format!("{experiment}{}: up to date", report.unit));
 }
 
-fn run_stage(context: &Context<'_>, stage: Stage, reports: &mut Vec<StageReport>) -> Result<(), PipelineError> {
-    let Some(units) = or_what_comes_first(context.options, stage, units(context, stage), reports)? else {
-        return Ok(());
+/// Runs whole units, one after the other.
+fn run_units(
+    context: &Context<'_>,
+    pipeline: &Path,
+    units: Vec<Box<dyn Unit + '_>>,
+) -> Result<Vec<StageReport>, PipelineError> {
+    // All are planned before the first is run: what is missing of one is told at once.
+    let planned: Result<Vec<(&dyn Unit, Planned)>, PipelineError> =
+        units.iter().map(|unit| Ok((unit.as_ref(), Planned::of(context, unit.as_ref())?))).collect();
+    let run = |(unit, planned): (&dyn Unit, Planned)| match planned {
+        Planned::Known(plan) => run_unit(context, pipeline, unit, *plan),
+        Planned::Behind(reason) => Ok(report_of(context, unit, Status::Needed, reason)),
     };
-    for unit in units {
-        context.go_on()?;
-        reports.push(run_unit(context.dir, context.options, stage, &unit, || work(context, stage, &unit))?);
+    planned?.into_iter().map(run).collect()
+}
+
+/// What is known of a unit's plan.
+enum Planned {
+    Known(Box<Plan>),
+    /// In a dry run: what comes first.
+    Behind(String),
+}
+
+impl Planned {
+    fn of(context: &Context<'_>, unit: &dyn Unit) -> Result<Self, PipelineError> {
+        match context.plan(unit) {
+            Err(PipelineError::Contract(ContractError::Unfinished { stage, .. })) if context.options.dry_run => {
+                Ok(Self::Behind(format!("{stage} comes first")))
+            }
+            plan => Ok(Self::Known(Box::new(plan?))),
+        }
     }
+}
+
+fn run_unit(context: &Context<'_>, pipeline: &Path, unit: &dyn Unit, plan: Plan) -> Result<StageReport, PipelineError> {
+    let Context { dir: run, options } = *context;
+    let need = if options.force { Some("--force".to_owned()) } else { why_needed(context, unit, &plan)? };
+    let (status, reason) = match need {
+        None => (Status::UpToDate, "up to date".to_owned()),
+        Some(reason) if options.dry_run => (Status::Needed, reason),
+        Some(reason) => {
+            context.go_on()?;
+            let watch = Stopwatch::start();
+            let shards: Vec<u32> = (0..plan.shards).collect();
+            let job = Job::new(context, unit, plan, &shards, false);
+            let worked = run_whole(unit, &job, shards);
+            let commit = (options.commit)(pipeline);
+            let measured = Measured { stage: unit.stage(), unit: &unit.name(), plan: &job.plan, commit };
+            Costs::read(run)?.add(&measured, watch.taken(), job.done())?;
+            worked?;
+            (Status::Done, reason)
+        }
+    };
+    let manifest = unit.dir(run).manifest()?.filter(|_| status != Status::Needed);
+    let (episodes, failed) = manifest.map_or((0, 0), |manifest| (manifest.episodes, manifest.failed));
+    Ok(StageReport { episodes, failed, ..report_of(context, unit, status, reason) })
+}
+
+/// Begins, does and commits a unit.
+fn run_whole(unit: &dyn Unit, job: &Job<'_>, shards: Vec<u32>) -> Result<(), PipelineError> {
+    let worker = unit.open(job)?;
+    if job.context.options.force {
+        job.dir.clear()?;
+    }
+    if !unit.appears_whole() {
+        job.dir.begin(&job.plan)?;
+    }
+    let made: Result<Vec<Option<Made>>, PipelineError> =
+        shards.into_par_iter().map(|shard| run_shard(unit, job, worker.as_ref(), shard)).collect();
+    finish(unit, job, made?.into_iter().flatten().find_map(|made| made.told))
+}
+
+/// Does a shard unless it is done.
+pub(super) fn run_shard(
+    unit: &dyn Unit,
+    job: &Job<'_>,
+    worker: &dyn Worker,
+    shard: u32,
+) -> Result<Option<Made>, PipelineError> {
+    if job.is_done(shard)? {
+        job.progress.inc(unit.amount(shard).count);
+        return Ok(None);
+    }
+    job.context.go_on()?;
+    let made = worker.shard(shard)?;
+    match &made {
+        // Its receipt came with the folder.
+        Some(_) if unit.appears_whole() => job.note_done(shard),
+        Some(made) => job.commit_shard(shard, made)?,
+        None => {}
+    }
+    Ok(made)
+}
+
+/// Commits a unit whose shards are done.
+pub(super) fn finish(unit: &dyn Unit, job: &Job<'_>, told: Option<String>) -> Result<(), PipelineError> {
+    let tables = unit.gather(job)?;
+    let manifest = job.dir.commit(&job.plan, &tables)?;
+    job.progress.finish(&told.unwrap_or_else(|| unit.told(&manifest)));
     Ok(())
 }
 
-/// The units of a stage; in a dry run a line instead when another stage must come first.
-fn or_what_comes_first(
-    options: &Options,
-    stage: Stage,
-    units: Result<Vec<Unit>, PipelineError>,
-    reports: &mut Vec<StageReport>,
-) -> Result<Option<Vec<Unit>>, PipelineError> {
-    match units {
-        Err(PipelineError::Contract(ContractError::Unfinished { stage: before, .. })) if options.dry_run => {
-            reports.push(StageReport {
-                experiment: options.experiment.clone(),
-                stage,
-                unit: stage.name().to_owned(),
-                status: Status::Needed,
-                reason: format!("{before} comes first"),
-                episodes: 0,
-                failed: 0,
-            });
-            Ok(None)
-        }
-        units => units.map(Some),
-    }
-}
-
-pub(super) fn units(context: &Context<'_>, stage: Stage) -> Result<Vec<Unit>, PipelineError> {
-    match stage {
-        Stage::Tasks => tasks::units(context),
-        Stage::Generate => generate::units(context),
-        Stage::Convert => convert::units(context),
-        Stage::Train => train::units(context),
-        Stage::Rollout => rollout::units(context),
-        Stage::Report => report::units(context),
-    }
-}
-
-fn work(context: &Context<'_>, stage: Stage, unit: &Unit) -> Result<(), PipelineError> {
-    match stage {
-        Stage::Tasks => tasks::work(context, unit),
-        Stage::Generate => generate::work(context, unit),
-        Stage::Convert => convert::work(context, unit),
-        Stage::Train => train::work(context, unit),
-        Stage::Rollout => rollout::work(context, unit),
-        Stage::Report => report::work(context, unit),
-    }
-}
-
-fn run_unit(
-    dir: &RunDir,
-    options: &Options,
-    stage: Stage,
-    unit: &Unit,
-    work: impl FnOnce() -> Result<(), PipelineError>,
-) -> Result<StageReport, PipelineError> {
-    let need = if options.force { Some("--force".to_owned()) } else { why_needed(unit)? };
-    let status = match (&need, options.dry_run) {
-        (None, _) => Status::UpToDate,
-        (Some(_), true) => Status::Needed,
-        (Some(_), false) => {
-            if options.force {
-                unit.dir.clear()?;
-            }
-            let watch = Stopwatch::start();
-            let worked = work();
-            if options.shard.is_none() {
-                let costs = Costs::read(dir)?;
-                costs.add(dir, stage, (&unit.name, &unit.plan), watch.taken(), options.commit.as_deref())?;
-            }
-            worked?;
-            Status::Done
-        }
-    };
-    let manifest = unit.dir.manifest()?;
-    let counts = manifest.filter(|_| status != Status::Needed).map_or((0, 0), |m| (m.episodes, m.failed));
-    Ok(StageReport {
-        experiment: options.experiment.clone(),
-        stage,
-        unit: unit.name.clone(),
+pub(super) fn report_of(context: &Context<'_>, unit: &dyn Unit, status: Status, reason: String) -> StageReport {
+    StageReport {
+        experiment: context.options.experiment.clone(),
+        stage: unit.stage(),
+        unit: unit.name(),
+        item: None,
+        shard: None,
+        shards: unit.shards(),
         status,
-        reason: need.unwrap_or_else(|| "up to date".to_owned()),
-        episodes: counts.0,
-        failed: counts.1,
-    })
+        reason,
+        missing: Vec::new(),
+        episodes: 0,
+        failed: 0,
+    }
 }
 
 /// Why a unit must be done; nothing when it is up to date.
-fn why_needed(unit: &Unit) -> Result<Option<String>, IoError> {
-    let Some(plan) = unit.dir.plan()? else { return Ok(Some("not done yet".to_owned())) };
-    if plan != unit.plan {
-        return Ok(Some(plan_difference(&plan, &unit.plan)));
+pub(super) fn why_needed(context: &Context<'_>, unit: &dyn Unit, plan: &Plan) -> Result<Option<String>, IoError> {
+    let dir = unit.dir(context.dir);
+    let Some(own) = dir.plan()? else { return Ok(Some("not done yet".to_owned())) };
+    if let Some(difference) = own.difference(plan) {
+        return Ok(Some(match dir.count_receipts()? {
+            0 => difference,
+            1 => format!("{difference}; its finished shard goes"),
+            receipts => format!("{difference}; its {receipts} finished shards go"),
+        }));
     }
-    let Some(manifest) = unit.dir.manifest()? else {
+    let Some(manifest) = dir.manifest()? else {
         return Ok(Some("begun but not finished".to_owned()));
     };
-    match unit.dir.check_files(&manifest, false) {
-        Ok(()) => Ok(None),
-        Err(error) => Ok(Some(error.to_string())),
-    }
-}
-
-fn plan_difference(old: &Plan, new: &Plan) -> String {
-    if old.ntp_version != new.ntp_version {
-        return format!("made by ntp {}, this is {}", old.ntp_version, new.ntp_version);
-    }
-    if let Some(input) = changed_keys(&old.inputs, &new.inputs) {
-        return format!("its input {input} changed");
-    }
-    match (old.config.as_object(), new.config.as_object()) {
-        (Some(old_config), Some(new_config)) => {
-            let flat = |map: &serde_json::Map<String, serde_json::Value>| {
-                map.iter().map(|(key, value)| (key.clone(), value.to_string())).collect::<BTreeMap<_, _>>()
-            };
-            let changed = changed_keys(&flat(old_config), &flat(new_config));
-            changed.map_or_else(|| "its plan changed".to_owned(), |key| format!("its setting {key} changed"))
-        }
-        _ => "its plan changed".to_owned(),
-    }
-}
-
-fn changed_keys(old: &BTreeMap<String, String>, new: &BTreeMap<String, String>) -> Option<String> {
-    let keys = old.keys().chain(new.keys().filter(|key| !old.contains_key(*key)));
-    keys.into_iter().find(|key| old.get(*key) != new.get(*key)).cloned()
+    Ok(dir.check_files(&manifest, false).err().map(|error| error.to_string()))
 }

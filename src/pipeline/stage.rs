@@ -27,6 +27,11 @@ impl Stage {
     /// Every stage in order.
     pub const ALL: [Self; 6] = [Self::Tasks, Self::Generate, Self::Convert, Self::Train, Self::Rollout, Self::Report];
 
+    /// Whether its units have shards.
+    pub fn has_shards(self) -> bool {
+        matches!(self, Self::Generate | Self::Rollout)
+    }
+
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {

@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::pipeline::resolve::{check_name, parse, read_text};
-use crate::pipeline::{Pipeline, PipelineError, ReportSpec};
+use crate::pipeline::{Pipeline, PipelineError, ReportSpec, RunDir};
 
 /// Experiments that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -61,6 +61,24 @@ impl PipelineFile {
             return Ok(Self::Study(Study::load(path)?));
         }
         Ok(Self::Experiment(Box::new(Pipeline::load(path)?)))
+    }
+
+    /// Its experiments, each with its run directory: that of the whole for one by itself.
+    pub fn experiments(&self, run: &RunDir) -> Vec<(&Pipeline, RunDir)> {
+        match self {
+            Self::Experiment(pipeline) => vec![(pipeline, run.clone())],
+            Self::Study(study) => {
+                study.experiments.iter().map(|pipeline| (pipeline, run.experiment(&pipeline.spec.name))).collect()
+            }
+        }
+    }
+
+    /// The file that it was read from.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Experiment(pipeline) => &pipeline.path,
+            Self::Study(study) => &study.path,
+        }
     }
 
     /// What names its run directory.

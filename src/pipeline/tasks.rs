@@ -2,51 +2,83 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::artifact::{FileEntry, Plan, Receipt};
-use crate::pipeline::runner::{Context, Part, Unit};
-use crate::pipeline::{PipelineError, Stage};
+use crate::artifact::StageDir;
+use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage};
 use crate::seed::Seed;
-use crate::task::{self, TaskSet};
+use crate::task::{self, Split, Task, TaskSet};
 
+/// Raised when the same settings draw other tasks.
+const VERSION: u32 = 1;
 const FILE: &str = "tasks.json";
 
-pub(super) fn units(context: &Context<'_>) -> Result<Vec<Unit>, PipelineError> {
-    let spec = &context.pipeline.spec;
-    let config = json!({ "seed": spec.seed, "tasks": spec.tasks });
-    let inputs = context.pipeline.import_hash()?.map(|hash| ("import".to_owned(), hash));
-    let plan = Plan::new(Stage::Tasks.name(), 1, inputs.into_iter().collect(), config);
-    Ok(vec![Unit { name: "tasks".to_owned(), dir: context.dir.tasks(), plan, part: Part::Whole }])
+/// The task set of an experiment.
+pub(super) struct Tasks<'p>(&'p Pipeline);
+
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Tasks<'_>> {
+    vec![Tasks(pipeline)]
 }
 
-pub(super) fn work(context: &Context<'_>, unit: &Unit) -> Result<(), PipelineError> {
-    let tasks = make(context)?;
-    tasks.validate()?;
-    unit.dir.begin(&unit.plan)?;
-    tasks.write(&unit.dir.path().join(FILE))?;
-    let receipt = Receipt {
-        plan_id: unit.plan.id(),
-        shard: 0,
-        episodes: 0,
-        failed: 0,
-        files: vec![FileEntry::of(unit.dir.path(), FILE)?],
-    };
-    unit.dir.commit_shard(&receipt)?;
-    unit.dir.commit(&unit.plan, &[])?;
-    Ok(())
+impl Unit for Tasks<'_> {
+    fn stage(&self) -> Stage {
+        Stage::Tasks
+    }
+
+    fn stage_version(&self) -> u32 {
+        VERSION
+    }
+
+    fn name(&self) -> String {
+        Stage::Tasks.name().to_owned()
+    }
+
+    fn dir(&self, run: &RunDir) -> StageDir {
+        run.tasks()
+    }
+
+    fn amount(&self, _shard: u32) -> Amount {
+        Amount { count: u64::from(self.0.spec.tasks.train) + u64::from(self.0.n_unseen()), of: "tasks" }
+    }
+
+    fn inputs(&self, _run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+        Ok(self.0.import_hash()?.map(|hash| ("import".to_owned(), hash)).into_iter().collect())
+    }
+
+    fn settings(&self) -> Value {
+        json!({ "seed": self.0.spec.seed, "tasks": self.0.spec.tasks })
+    }
+
+    fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+        let tasks = make(self.0)?;
+        tasks.validate()?;
+        Ok(Box::new(Writer { tasks, job }))
+    }
 }
 
-fn make(context: &Context<'_>) -> Result<TaskSet, PipelineError> {
-    let spec = &context.pipeline.spec;
-    let Some(path) = context.pipeline.import_path() else {
+struct Writer<'j> {
+    tasks: TaskSet,
+    job: &'j Job<'j>,
+}
+
+impl Worker for Writer<'_> {
+    fn shard(&self, _shard: u32) -> Result<Option<Made>, PipelineError> {
+        self.tasks.write(&self.job.dir.path().join(FILE))?;
+        Ok(Some(Made::files(&self.job.dir, [FILE])?))
+    }
+}
+
+fn make(pipeline: &Pipeline) -> Result<TaskSet, PipelineError> {
+    let spec = &pipeline.spec;
+    let Some(path) = pipeline.import_path() else {
         let seed = Seed(spec.seed).derive("tasks", &[]);
-        return Ok(task::sample(spec.tasks.pool(), spec.tasks.train, context.pipeline.n_unseen(), seed)?);
+        return Ok(task::sample(spec.tasks.pool(), spec.tasks.train, pipeline.n_unseen(), seed)?);
     };
     let mut tasks = task::import(&path, spec.tasks.train)?;
     if tasks.family != spec.tasks.family {
         return Err(PipelineError::Value {
-            path: context.pipeline.path.clone(),
+            path: pipeline.path.clone(),
             key: "tasks.family".to_owned(),
             problem: format!("is {}, but {} holds {}", spec.tasks.family.name(), path.display(), tasks.family.name()),
         });
@@ -55,7 +87,7 @@ fn make(context: &Context<'_>) -> Result<TaskSet, PipelineError> {
         let wanted = (spec.tasks.train + unseen) as usize;
         if tasks.tasks.len() < wanted {
             return Err(PipelineError::Value {
-                path: context.pipeline.path.clone(),
+                path: pipeline.path.clone(),
                 key: "tasks.unseen".to_owned(),
                 problem: format!("asks for {wanted} tasks in all, but {} holds {}", path.display(), tasks.tasks.len()),
             });
@@ -65,10 +97,27 @@ fn make(context: &Context<'_>) -> Result<TaskSet, PipelineError> {
     Ok(tasks)
 }
 
-/// The task set of a finished stage, with the version that later stages name as their input.
-pub(super) fn read(context: &Context<'_>) -> Result<(TaskSet, BTreeMap<String, String>), PipelineError> {
-    let dir = context.dir.tasks();
-    let version = dir.version()?;
-    let tasks = TaskSet::read(&dir.path().join(FILE))?;
-    Ok((tasks, BTreeMap::from([(Stage::Tasks.name().to_owned(), version)])))
+/// The task set of a finished stage.
+pub(super) fn read(run: &RunDir) -> Result<TaskSet, PipelineError> {
+    let dir = run.tasks();
+    dir.finished()?;
+    Ok(TaskSet::read(&dir.path().join(FILE))?)
+}
+
+/// The training tasks of a finished stage.
+pub(super) fn training(pipeline: &Pipeline, run: &RunDir) -> Result<Vec<Task>, PipelineError> {
+    let mut tasks = read(run)?.tasks;
+    tasks.retain(|task| task.split == Split::Seen);
+    let asked = pipeline.spec.tasks.train;
+    if tasks.len() != asked as usize {
+        let found = run.tasks().path().join(FILE);
+        let problem = format!("is {asked}, but {} holds {}; stage tasks comes first", found.display(), tasks.len());
+        return Err(PipelineError::Value { path: pipeline.path.clone(), key: "tasks.train".to_owned(), problem });
+    }
+    Ok(tasks)
+}
+
+/// The version of a finished task set, as later stages name it among their inputs.
+pub(super) fn version(run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
+    Ok(BTreeMap::from([(Stage::Tasks.name().to_owned(), run.tasks().version()?)]))
 }

@@ -7,10 +7,10 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::artifact::Plan;
-use crate::pipeline::PipelineError;
 use crate::pipeline::generate::disturbed;
+use crate::pipeline::{PipelineError, Recorded};
 use crate::robot::{Action, RobotApi as _};
-use crate::sim::{AdversaryConfig, Simulation, SimulationConfig};
+use crate::sim::Simulation;
 use crate::task;
 use crate::trace::Episode;
 
@@ -53,10 +53,12 @@ impl fmt::Display for Verification {
 ///
 /// When the world cannot be made.
 pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineError> {
-    let Some(mut config) = recorded_config(plan) else {
+    let Some(recorded) = Recorded::of(plan) else {
         let problem = "the plan attached to the recording holds no simulation settings".to_owned();
         return Ok(Verification::Unknown { problem });
     };
+    let adversary = recorded.adversary();
+    let mut config = recorded.simulation;
     if episode.frames.iter().all(|frame| frame.boundary) {
         config.frame_hz = 0;
     }
@@ -64,7 +66,7 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
     let scene = task::scene(provenance.family, &provenance.counts);
     let initial = task::initial_state(provenance.family, &scene, provenance.trial().seed);
     let world = Simulation::new(scene, &initial, &config)?;
-    let mut world = disturbed(world, recorded_adversary(plan), provenance.trial().seed)?;
+    let mut world = disturbed(world, adversary, provenance.trial().seed)?;
     for call in episode.calls.iter() {
         if let Some(action) = Action::new(call.program, call.argument) {
             // What goes wrong in physics went wrong the first time too; the frames tell.
@@ -72,17 +74,6 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
         }
     }
     Ok(compare(episode, world.frames()))
-}
-
-/// Settings under `generate.simulation` (demonstrations) or `simulation` (rollouts).
-fn recorded_config(plan: &Plan) -> Option<SimulationConfig> {
-    let config = plan.config.pointer("/generate/simulation").or_else(|| plan.config.get("simulation"))?;
-    serde_json::from_value(config.clone()).ok()
-}
-
-/// Settings of a suite's adversary, if it had one.
-fn recorded_adversary(plan: &Plan) -> Option<AdversaryConfig> {
-    serde_json::from_value(plan.config.pointer("/suite/adversary")?.clone()).ok()
 }
 
 fn compare(episode: &Episode, again: &[crate::trace::Frame]) -> Verification {

@@ -41,8 +41,7 @@ pub struct Pictured<T> {
 /// The cameras that filmed a recording's episodes, as its plan tells: the first is what a policy that sees looks with.
 /// None where there were none, or the plan is of another kind.
 pub fn cameras_of(plan: &Plan) -> Vec<CameraConfig> {
-    let cameras = plan.config.pointer("/generate/cameras").or_else(|| plan.config.get("cameras"));
-    cameras.and_then(|cameras| serde_json::from_value(cameras.clone()).ok()).unwrap_or_default()
+    plan.setting(&["generate", "cameras"]).or_else(|| plan.setting(&["cameras"])).unwrap_or_default()
 }
 
 /// The cameras of a recording that is being written.

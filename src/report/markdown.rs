@@ -168,9 +168,10 @@ pub(super) fn made_by(report: &Report) -> String {
         let seeds = seeds.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
         parts.push(format!("training seeds {seeds}"));
     }
-    let cpu_secs: f64 = report.costs.iter().map(|cost| cost.cpu_secs).sum();
-    if cpu_secs > 0.0 {
-        parts.push(format!("{} CPU-minutes", short((cpu_secs / 6.0).round() / 10.0)));
+    if !report.costs.is_empty() {
+        let cpu_secs: Option<f64> = report.costs.iter().map(|cost| cost.cpu_secs).sum();
+        let minutes = cpu_secs.map_or_else(|| "-".to_owned(), |secs| short((secs / 6.0).round() / 10.0));
+        parts.push(format!("{minutes} CPU-minutes"));
     }
     let experiments = distinct(report.aggregates.iter().map(|row| &row.actor.experiment));
     if experiments.len() > 1 {

@@ -220,10 +220,10 @@ pub struct StageCost {
     pub experiment: String,
     /// Which stage.
     pub stage: String,
-    /// CPU-seconds of the process, all threads together.
-    pub cpu_secs: f64,
-    /// Seconds on the clock.
-    pub wall_secs: f64,
+    /// CPU-seconds of the process, all threads together; none where a part of it was not measured.
+    pub cpu_secs: Option<f64>,
+    /// Seconds on the clock, likewise; those of processes side by side are added up.
+    pub wall_secs: Option<f64>,
 }
 
 /// The losses of one program level at the end of a training.

@@ -29,6 +29,7 @@ const ORDER: &[&str] = &[
     "report",
     "query",
     "pipeline",
+    "cluster",
     "lineage",
     "publish",
     "cli",

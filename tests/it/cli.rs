@@ -2,6 +2,8 @@
 
 use assert_cmd::Command;
 
+use crate::smoke;
+
 fn ntp() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ntp"));
     command.current_dir(env!("CARGO_MANIFEST_DIR"));
@@ -34,9 +36,7 @@ fn something_that_is_nothing_of_ours_is_named() {
 
 #[test]
 fn replay_without_a_purpose_says_what_to_choose() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    ntp().args(["run", "pipelines/smoke.toml", "--to", "generate", "--out"]).arg(&out).assert().success();
+    let out = smoke::whole();
     let output = ntp().arg("replay").arg(out.join("recordings")).args(["--episode", "0"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("--save FILE.rrd"));
@@ -54,9 +54,7 @@ fn completions_are_printed_for_a_shell() {
 
 #[test]
 fn inspect_says_what_each_part_of_a_run_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    ntp().args(["run", "pipelines/smoke.toml", "--out"]).arg(&out).assert().success();
+    let out = smoke::whole();
     let kind = |part: &str| {
         let output = ntp().arg("inspect").arg(out.join(part)).arg("--json").output().unwrap();
         let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -81,8 +79,7 @@ fn inspect_says_what_each_part_of_a_run_is() {
 #[test]
 fn what_cannot_be_carried_on_ends_at_the_first_interrupt_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    ntp().args(["run", "pipelines/smoke.toml", "--to", "generate", "--out"]).arg(&out).assert().success();
+    let out = smoke::whole();
     let clips = folder.path().join("clips");
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_ntp"))
         .args(["render", "--episode", "0", "--size", "1920x1080", "--fps", "60"])

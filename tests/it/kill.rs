@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::length::{from_environment, tell};
 use crate::pipeline::{hashes, run};
+use crate::smoke::copy_folder;
 
 /// Kills of each command in the suite.
 const IN_SUITE: u64 = 3;
@@ -65,19 +66,6 @@ fn attempts(pipeline: &Path, root: &Path) -> Vec<Attempt> {
         },
         Attempt { name: "merge", arguments: merge, needs: &["parts"], makes: &["merged"] },
     ]
-}
-
-fn copy_folder(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            copy_folder(&path, &target);
-        } else {
-            std::fs::copy(&path, &target).unwrap();
-        }
-    }
 }
 
 /// Gives the command again. A merged dataset is there as a whole or not, and is not written again.
@@ -145,6 +133,7 @@ fn kills_at_random_moments_lose_double_and_spoil_nothing() {
         }
         std::fs::remove_dir_all(&root).unwrap();
     }
+    assert!(n_running > 0, "none was running when it was killed");
     tell(&format!(
         "{n_running} kills of running processes in {n_kills} rounds; every folder had the same bytes afterwards"
     ));

@@ -9,15 +9,7 @@ use ntp::task::Split;
 use serde_json::Value;
 
 use crate::pipeline::run;
-
-/// A run as far as its dataset, or its models.
-fn run_to(stage: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_string_lossy();
-    let (code, _, stderr) = run(&["run", "pipelines/smoke.toml", "--out", out.as_ref(), "--to", stage]);
-    assert_eq!(code, 0, "{stderr}");
-    folder
-}
+use crate::smoke::copy_to;
 
 fn manifest_hash(folder: &Path) -> Option<String> {
     Some(sha256_file(&folder.join("manifest.json")).unwrap())
@@ -25,7 +17,7 @@ fn manifest_hash(folder: &Path) -> Option<String> {
 
 #[test]
 fn a_frame_leads_to_its_calls_its_recording_and_every_stage_before() {
-    let folder = run_to("convert");
+    let folder = copy_to("convert");
     let dataset = folder.path().join("dataset");
     let found = explain_episode(&dataset, 1, Some(2), &[]).unwrap();
     let frame = found.frame.unwrap();
@@ -51,7 +43,7 @@ fn a_frame_leads_to_its_calls_its_recording_and_every_stage_before() {
 
 #[test]
 fn an_edited_dataset_leads_to_what_it_was_made_of() {
-    let folder = run_to("convert");
+    let folder = copy_to("convert");
     let (dataset, edited) = (folder.path().join("dataset"), folder.path().join("deep/er/edited"));
     filter(&dataset, &Condition { split: Some(Split::Seen), ..Condition::default() }, &edited).unwrap();
     let recordings = [folder.path().join("recordings")];
@@ -67,7 +59,7 @@ fn an_edited_dataset_leads_to_what_it_was_made_of() {
 
 #[test]
 fn what_is_missing_or_other_upstream_is_told() {
-    let folder = run_to("convert");
+    let folder = copy_to("convert");
     let dataset = folder.path().join("dataset");
     let other = folder.path().join("other");
     let name = explain_episode(&dataset, 0, None, &[]).unwrap().episode.recording;
@@ -86,7 +78,7 @@ fn what_is_missing_or_other_upstream_is_told() {
 
 #[test]
 fn the_commands_print_lineage_and_differences_and_exit_as_documented() {
-    let folder = run_to("train");
+    let folder = copy_to("train");
     let at = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     let models: Vec<PathBuf> = std::fs::read_dir(at("models")).unwrap().map(|entry| entry.unwrap().path()).collect();
     let model = models[0].to_string_lossy().into_owned();

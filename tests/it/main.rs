@@ -9,6 +9,8 @@ mod cli;
 #[cfg(all(test, feature = "cloud"))]
 mod cloud;
 #[cfg(test)]
+mod cluster;
+#[cfg(test)]
 mod damaged_model;
 #[cfg(test)]
 mod dataset;
@@ -78,6 +80,8 @@ mod schemas_parquet;
 mod seeing;
 #[cfg(test)]
 mod sim;
+#[cfg(test)]
+mod smoke;
 #[cfg(test)]
 mod study;
 #[cfg(test)]

@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use ntp::artifact::sha256_file;
-use ntp::pipeline::{Pipeline, PipelineError, PipelineFile};
+use ntp::artifact::{Plan, sha256_file};
+use ntp::pipeline::{Pipeline, PipelineError, PipelineFile, RunDir};
+
+use crate::smoke;
 
 pub(crate) fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn ntp(arguments: &[&str]) -> Command {
+pub(crate) fn ntp(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ntp"));
     command.args(arguments).current_dir(repository()).stdin(Stdio::null());
     command
@@ -26,7 +28,7 @@ pub(crate) fn run(arguments: &[&str]) -> (i32, String, String) {
 
 fn run_smoke(out: &Path, more: &[&str]) -> (i32, String, String) {
     let out = out.to_string_lossy();
-    run(&[&["run", "pipelines/smoke.toml", "--out", out.as_ref()], more].concat())
+    run(&[&["run", smoke::PIPELINE, "--out", out.as_ref()], more].concat())
 }
 
 /// Every file below the folders of a run, with its hash, in order.
@@ -53,49 +55,152 @@ pub(crate) const ALL: [&str; 5] = ["tasks", "recordings", "dataset", "models", "
 
 #[test]
 fn a_second_run_finds_every_stage_up_to_date_and_changes_no_byte() {
-    let folder = tempfile::tempdir().unwrap();
-    let (code, _, stderr) = run_smoke(folder.path(), &[]);
-    assert_eq!(code, 0, "{stderr}");
-    let before = hashes(folder.path(), &ALL);
+    let folder = smoke::copy_to("report");
     let (code, stdout, _) = run_smoke(folder.path(), &[]);
     assert_eq!(code, 0);
     assert_eq!(stdout.lines().count(), 7, "{stdout}");
     assert!(stdout.lines().all(|line| line.contains("up to date")), "{stdout}");
-    assert_eq!(hashes(folder.path(), &ALL), before);
+    assert_eq!(hashes(folder.path(), &ALL), hashes(smoke::whole(), &ALL));
 }
 
 #[test]
 fn one_job_and_two_give_the_same_bytes_in_every_stage() {
-    let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let one = tempfile::tempdir().unwrap();
     assert_eq!(run_smoke(one.path(), &["--jobs", "1"]).0, 0);
-    assert_eq!(run_smoke(two.path(), &["--jobs", "2"]).0, 0);
-    assert_eq!(hashes(one.path(), &ALL), hashes(two.path(), &ALL));
+    assert_eq!(hashes(one.path(), &ALL), hashes(smoke::whole(), &ALL));
 }
 
 #[test]
 fn a_run_killed_at_any_moment_carries_on_to_the_same_bytes() {
-    let whole = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(whole.path(), &[]).0, 0);
-    let wanted = hashes(whole.path(), &ALL);
-    for kill_after_millis in [20, 60, 120, 200, 300, 450] {
+    let wanted = hashes(smoke::whole(), &ALL);
+    let mut n_killed = 0;
+    for share in [0.05, 0.15, 0.3, 0.45, 0.6, 0.8] {
         let broken = tempfile::tempdir().unwrap();
         let out = broken.path().to_string_lossy();
-        let mut child = ntp(&["run", "pipelines/smoke.toml", "--out", out.as_ref()])
+        let mut child = ntp(&["run", smoke::PIPELINE, "--out", out.as_ref()])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(Duration::from_millis(kill_after_millis));
-        // A child that has already ended is fine: some of the moments lie behind the end.
+        std::thread::sleep(smoke::lasted().mul_f64(share));
+        n_killed += usize::from(child.try_wait().unwrap().is_none());
+        // A child that has already ended is fine, if not all have.
         let _ended = child.kill();
         child.wait().unwrap();
         let (code, _, stderr) = run_smoke(broken.path(), &[]);
-        assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
+        assert_eq!(code, 0, "killed after {share} of its time: {stderr}");
         let found = hashes(broken.path(), &ALL);
         let differing: Vec<_> = found.iter().filter(|file| !wanted.contains(file)).collect();
-        assert!(differing.is_empty(), "killed after {kill_after_millis} ms: {differing:?}");
-        assert_eq!(found.len(), wanted.len(), "killed after {kill_after_millis} ms");
+        assert!(differing.is_empty(), "killed after {share} of its time: {differing:?}");
+        assert_eq!(found.len(), wanted.len(), "killed after {share} of its time");
     }
+    assert!(n_killed >= 2, "{n_killed} of 6 were running when they were killed");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_says_so_exits_with_130_and_carries_on_to_the_same_bytes() {
+    for signal in ["-INT", "-TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().to_string_lossy();
+        let mut command = ntp(&["run", smoke::PIPELINE, "--out", out.as_ref()]);
+        let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        while !folder.path().join("recordings/plan.json").exists() {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        assert!(stderr.contains("interrupted; the same command carries on"), "{stderr}");
+        assert_eq!(run_smoke(folder.path(), &[]).0, 0);
+        assert_eq!(hashes(folder.path(), &ALL), hashes(smoke::whole(), &ALL));
+    }
+}
+
+#[test]
+fn force_does_again_what_is_up_to_date_and_nothing_else() {
+    let folder = smoke::copy_to("report");
+    std::fs::write(folder.path().join("rollouts/oracle/stacking_unseen/left-behind"), "").unwrap();
+    let (code, stdout, stderr) = run_smoke(folder.path(), &["--from", "rollout", "--to", "rollout", "--force"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.lines().count() == 2 && stdout.lines().all(|line| line.contains("--force")), "{stdout}");
+    assert_eq!(hashes(folder.path(), &ALL), hashes(smoke::whole(), &ALL));
+}
+
+#[test]
+fn stages_in_the_wrong_order_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, stderr) = run_smoke(&folder.path().join("run"), &["--from", "report", "--to", "tasks"]);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(stderr.contains("--from") && stderr.contains("report, which comes after --to tasks"), "{stderr}");
+    assert!(!folder.path().join("run").exists(), "something was written");
+}
+
+#[test]
+fn a_shard_of_what_has_none_is_refused_with_the_stages_that_have_shards() {
+    let folder = smoke::copy_to("report");
+    let before = hashes(folder.path(), &ALL);
+    let out = folder.path().to_string_lossy();
+    for command in ["run", "convert", "train", "report"] {
+        let (code, _, stderr) = run(&[command, smoke::PIPELINE, "--out", out.as_ref(), "--shard", "0"]);
+        assert_eq!(code, 2, "{command}: {stderr}");
+        assert!(stderr.contains("stages with shards are generate, rollout"), "{command}: {stderr}");
+    }
+    assert_eq!(run(&["tasks", smoke::PIPELINE, "--out", out.as_ref(), "--shard", "0"]).0, 2);
+    assert_eq!(hashes(folder.path(), &ALL), before);
+}
+
+#[test]
+fn what_an_earlier_release_made_is_up_to_date_and_what_another_stage_version_made_is_not() {
+    let folder = smoke::copy_to("report");
+    let edit = |stage: &str, from: &str, to: &str| {
+        let path = folder.path().join(stage).join("plan.json");
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{text}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+    };
+    let own = format!("\"ntp_version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    for stage in ["tasks", "recordings", "dataset", "models/ntp-seed0", "rollouts/oracle/stacking_unseen"] {
+        edit(stage, &own, "\"ntp_version\": \"0.0.9\"");
+    }
+    let (code, stdout, stderr) = run_smoke(folder.path(), &["--dry-run"]);
+    assert!(code == 0 && stderr.contains("nothing is left to do"), "{stdout} {stderr}");
+    edit("models/ntp-seed0", "\"ntp_version\"", "\"stage_version\": 9,\n  \"ntp_version\"");
+    let (_, stdout, stderr) = run_smoke(folder.path(), &["--dry-run"]);
+    assert!(stderr.contains("left: train 1 of 1"), "{stderr}");
+    assert!(stdout.contains("made by version 9 of train, this is 1"), "{stdout}");
+}
+
+#[test]
+fn settings_that_json_moves_by_their_last_bit_are_up_to_date_in_a_second_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipeline = folder.path().join("adversary.toml");
+    let smoke = std::fs::read_to_string(repository().join(smoke::PIPELINE)).unwrap();
+    let adversary = "episodes = 4\nadversary = { probability = 0.25, impulse_ns = 0.03 }";
+    std::fs::write(&pipeline, smoke.replace("episodes = 4", adversary)).unwrap();
+    let (path, out) = (pipeline.to_string_lossy(), folder.path().join("run"));
+    let arguments = ["run", path.as_ref(), "--out", &out.to_string_lossy()];
+    assert_eq!(run(&arguments).0, 0);
+    let (code, stdout, _) = run(&arguments);
+    assert!(code == 0 && stdout.lines().all(|line| line.contains("up to date")), "{stdout}");
+}
+
+#[test]
+fn the_plans_of_every_shipped_pipeline_survive_their_own_json() {
+    let mut n_plans = 0;
+    for path in shipped() {
+        let file = PipelineFile::load(&path).unwrap();
+        for (pipeline, _) in file.experiments(&RunDir::new("")) {
+            for plan in ntp::pipeline::plans(pipeline) {
+                let read: Plan = serde_json::from_str(&serde_json::to_string_pretty(&plan).unwrap()).unwrap();
+                assert_eq!(read, plan, "{}", path.display());
+                assert_eq!(read.id(), plan.id(), "{}", path.display());
+                n_plans += 1;
+            }
+        }
+    }
+    assert!(n_plans > 100, "{n_plans}");
 }
 
 #[test]
@@ -109,22 +214,19 @@ fn a_second_run_on_the_same_directory_says_so_and_stops() {
 
 #[test]
 fn shards_done_one_by_one_are_committed_by_the_stage() {
-    let (whole, by_shard) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    assert_eq!(run_smoke(whole.path(), &["--to", "generate"]).0, 0);
+    let by_shard = smoke::copy_to("tasks");
     let out = by_shard.path().to_string_lossy();
-    assert_eq!(run(&["tasks", "pipelines/smoke.toml", "--out", out.as_ref()]).0, 0);
     for shard in ["2", "0", "1"] {
         let arguments = ["generate", "pipelines/smoke.toml", "--out", out.as_ref(), "--shard", shard];
         assert_eq!(run(&arguments).0, 0);
     }
     assert_eq!(run(&["generate", "pipelines/smoke.toml", "--out", out.as_ref()]).0, 0);
-    assert_eq!(hashes(whole.path(), &["recordings"]), hashes(by_shard.path(), &["recordings"]));
+    assert_eq!(hashes(smoke::whole(), &["recordings"]), hashes(by_shard.path(), &["recordings"]));
 }
 
 #[test]
 fn a_shard_that_does_not_exist_is_refused_with_those_that_do() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &["--to", "tasks"]).0, 0);
+    let folder = smoke::copy_to("tasks");
     let out = folder.path().to_string_lossy();
     let (code, _, stderr) = run(&["generate", "pipelines/smoke.toml", "--out", out.as_ref(), "--shard", "3"]);
     assert_eq!(code, 2);
@@ -133,8 +235,7 @@ fn a_shard_that_does_not_exist_is_refused_with_those_that_do() {
 
 #[test]
 fn a_model_of_another_family_or_variant_is_refused_with_its_path_and_what_is_asked_for() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &["--to", "train"]).0, 0);
+    let folder = smoke::copy_to("train");
     let config = folder.path().join("models/ntp-seed0/config.json");
     let text = std::fs::read_to_string(&config).unwrap();
     // As many bytes as before: the manifest looks at no more when it says what is up to date.
@@ -153,8 +254,7 @@ fn a_model_of_another_family_or_variant_is_refused_with_its_path_and_what_is_ask
 
 #[test]
 fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &[]).0, 0);
+    let folder = smoke::copy_to("report");
     let changed =
         std::fs::read_to_string(repository().join("pipelines/smoke.toml")).unwrap().replace("steps = 6", "steps = 7");
     let pipeline = folder.path().join("changed.toml");
@@ -170,8 +270,7 @@ fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
 
 #[test]
 fn a_recording_that_was_cut_off_is_made_again() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &["--to", "convert"]).0, 0);
+    let folder = smoke::copy_to("convert");
     let before = hashes(folder.path(), &["recordings", "dataset"]);
     let recording = folder.path().join("recordings/shard-00001-of-00003.mcap");
     let bytes = std::fs::read(&recording).unwrap();
@@ -184,8 +283,7 @@ fn a_recording_that_was_cut_off_is_made_again() {
 
 #[test]
 fn validate_names_a_flipped_byte() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &["--to", "convert"]).0, 0);
+    let folder = smoke::copy_to("convert");
     let out = folder.path().to_string_lossy();
     let (code, stdout, _) = run(&["validate", out.as_ref()]);
     assert_eq!(code, 0, "{stdout}");
@@ -201,15 +299,13 @@ fn validate_names_a_flipped_byte() {
 
 #[test]
 fn an_episode_simulated_again_is_the_same_in_every_frame() {
-    let folder = tempfile::tempdir().unwrap();
-    assert_eq!(run_smoke(folder.path(), &[]).0, 0);
     for part in ["recordings", "rollouts/oracle/stacking_unseen", "rollouts/ntp-seed0-mss/stacking_unseen"] {
-        let path = folder.path().join(part);
+        let path = smoke::whole().join(part);
         let (code, stdout, stderr) = run(&["replay", path.to_string_lossy().as_ref(), "--episode", "1", "--verify"]);
         assert_eq!(code, 0, "{part}: {stdout} {stderr}");
         assert!(stdout.contains("are the same"), "{stdout}");
     }
-    let recorded = folder.path().join("recordings");
+    let recorded = smoke::whole().join("recordings");
     let (code, stdout, _) = run(&["replay", &recorded.to_string_lossy(), "--episode", "0,2", "--verify", "--json"]);
     let verified: serde_json::Value = serde_json::from_str(&stdout).expect("one document, however many episodes");
     let told = |episode: &serde_json::Value| {
@@ -219,18 +315,26 @@ fn an_episode_simulated_again_is_the_same_in_every_frame() {
     assert_eq!((code, told), (0, vec![(0, "same".to_owned()), (2, "same".to_owned())]));
 }
 
-#[test]
-fn every_shipped_pipeline_can_be_loaded() {
-    let mut folders = vec![repository().join("pipelines")];
+/// Every pipeline file of the repository.
+fn shipped() -> Vec<PathBuf> {
+    let (mut files, mut folders) = (Vec::new(), vec![repository().join("pipelines")]);
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|extension| extension == "toml") {
-                PipelineFile::load(&path).unwrap();
+                files.push(path);
             }
         }
+    }
+    files
+}
+
+#[test]
+fn every_shipped_pipeline_can_be_loaded() {
+    for path in shipped() {
+        PipelineFile::load(&path).unwrap();
     }
 }
 

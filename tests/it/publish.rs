@@ -225,12 +225,10 @@ fn a_publication_asks_for_licence_and_day_and_says_what_is_known() {
 
 #[test]
 fn the_pipeline_of_a_published_dataset_makes_it_again() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = crate::smoke::copy_to("convert");
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let (code, _, stderr) = run(&["run", "pipelines/smoke.toml", "--to", "convert", "--out", &path("run")]);
-    assert_eq!(code, 0, "{stderr}");
     let words = ["--license", "cc0-1.0", "--date", "2026-11-24", "--name", "Smoke"];
-    let (code, _, stderr) = run(&[&["publish", &path("run/dataset"), "--to", &path("published")], &words[..]].concat());
+    let (code, _, stderr) = run(&[&["publish", &path("dataset"), "--to", &path("published")], &words[..]].concat());
     assert_eq!(code, 0, "{stderr}");
     let card = std::fs::read_to_string(folder.path().join("published/README.md")).unwrap();
     assert!(card.contains("ntp run pipeline.toml --out RUN --to convert"), "{card}");

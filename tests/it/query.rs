@@ -1,6 +1,6 @@
 //! SQL over the tables: counts agree with the writer's, examples are true, and nothing panics.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use ntp::dataset::ConvertConfig;
 use ntp::query::{QueryError, Tables, query};
@@ -144,24 +144,22 @@ fn ntp(arguments: &[&str], run: &Path) -> std::process::Output {
 
 #[test]
 fn every_example_of_the_page_is_answered_with_rows() {
-    let folder = tempfile::tempdir().unwrap();
-    let run: PathBuf = folder.path().join("run");
-    assert!(ntp(&["run", "pipelines/smoke.toml"], &run).status.success());
+    let run = crate::smoke::whole();
     let examples = examples();
     assert!(examples.len() >= 7);
     for sql in &examples {
-        let output = ntp(&["query", sql, "--json"], &run);
+        let output = ntp(&["query", sql, "--json"], run);
         let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{sql}\n{complaint}");
         let rows: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
         assert!(!rows.is_empty() || sql.contains("first_divergence IS NOT NULL"), "{sql}");
     }
-    let count = ntp(&["query", "SELECT COUNT(*) AS n, COUNT(DISTINCT model) AS models FROM metrics", "--csv"], &run);
+    let count = ntp(&["query", "SELECT COUNT(*) AS n, COUNT(DISTINCT model) AS models FROM metrics", "--csv"], run);
     assert!(String::from_utf8(count.stdout).unwrap().starts_with("n,models\n"));
-    let listed = String::from_utf8(ntp(&["query"], &run).stdout).unwrap();
+    let listed = String::from_utf8(ntp(&["query"], run).stdout).unwrap();
     let tables: Vec<&str> = listed.lines().filter(|line| !line.starts_with(' ')).collect();
     assert_eq!(tables, ["calls", "episodes", "frames", "metrics", "rollouts", "scopes", "subtasks", "tasks"]);
-    let refused = ntp(&["query", "SELECT nothing FROM frames"], &run);
+    let refused = ntp(&["query", "SELECT nothing FROM frames"], run);
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("nothing"));
 }

@@ -165,10 +165,7 @@ fn a_recording_cut_anywhere_keeps_its_whole_episodes_as_they_were_written() {
 
 #[test]
 fn a_damaged_recording_keeps_what_lies_before_the_damage_and_the_plan_beside_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_string_lossy();
-    let (code, _, stderr) = run(&["run", "pipelines/smoke.toml", "--out", out.as_ref(), "--to", "generate"]);
-    assert_eq!(code, 0, "{stderr}");
+    let folder = crate::smoke::copy_to("generate");
     let recordings = folder.path().join("recordings");
     let plan = ShardReader::open(&first_recording(&recordings)).unwrap().plan_json().to_owned();
     let (broken, to) = (recordings.join("broken.mcap"), folder.path().join("to.mcap"));

@@ -259,8 +259,8 @@ impl Run {
             costs: vec![StageCost {
                 experiment: "ten".to_owned(),
                 stage: "train".to_owned(),
-                cpu_secs: 90.0,
-                wall_secs: 50.0,
+                cpu_secs: Some(90.0),
+                wall_secs: Some(50.0),
             }],
             commits: vec!["0123456789".to_owned()],
             paper: paper_values(),

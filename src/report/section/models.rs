@@ -30,7 +30,7 @@ fn fill(of: &Contents<'_>) -> Models {
         models: models(&of.report.models),
         cost_stages,
         costs,
-        total_cpu_mins: format!("{:.1}", of.report.costs.iter().map(|cost| cost.cpu_secs).sum::<f64>() / 60.0),
+        total_cpu_mins: minutes(of.report.costs.iter().map(|cost| cost.cpu_secs)),
     }
 }
 
@@ -80,20 +80,27 @@ struct CostRow {
     wall_mins: String,
 }
 
-/// The stages that cost anything, and one row an experiment.
+/// The stages of which something is known, and one row an experiment; what was not measured is `-`.
 fn costs(costs: &[StageCost]) -> (Vec<String>, Vec<CostRow>) {
     let stages = distinct(costs.iter().map(|cost| &cost.stage));
     let row = |own: &[StageCost]| {
-        let of = |stage: &String| own.iter().find(|cost| cost.stage == *stage).map_or(0.0, |cost| cost.cpu_secs);
-        let cpu_secs: f64 = own.iter().map(|cost| cost.cpu_secs).sum();
-        let wall_secs: f64 = own.iter().map(|cost| cost.wall_secs).sum();
+        let of = |stage: &String| own.iter().find(|cost| cost.stage == *stage).and_then(|cost| cost.cpu_secs);
         CostRow {
             experiment: own[0].experiment.clone(),
-            stages: stages.iter().map(|stage| format!("{:.0}", of(stage))).collect(),
-            cpu_mins: format!("{:.1}", cpu_secs / 60.0),
-            wall_mins: format!("{:.1}", wall_secs / 60.0),
+            stages: stages.iter().map(|stage| of(stage).map_or_else(unknown, |secs| format!("{secs:.0}"))).collect(),
+            cpu_mins: minutes(own.iter().map(|cost| cost.cpu_secs)),
+            wall_mins: minutes(own.iter().map(|cost| cost.wall_secs)),
         }
     };
     let rows = costs.chunk_by(|a, b| a.experiment == b.experiment).map(row).collect();
     (stages, rows)
+}
+
+/// Seconds in all as minutes, if all are known.
+fn minutes(secs: impl Iterator<Item = Option<f64>>) -> String {
+    secs.sum::<Option<f64>>().map_or_else(unknown, |secs| format!("{:.1}", secs / 60.0))
+}
+
+fn unknown() -> String {
+    "-".to_owned()
 }
