@@ -8,10 +8,10 @@ use std::io::{Read, Seek, SeekFrom, Write};
 
 use mcap::records::op;
 
-/// No record of ours is longer, and a reader takes none that is: a wrong length must not exhaust memory.
-pub(super) const MAX_RECORD_BYTES: usize = 64 << 20;
+/// A reader takes no record that is longer, and no chunk that holds more: a wrong length must not exhaust memory.
+pub(super) const MAX_RECORD_BYTES: usize = 256 << 20;
 /// Opcode and length before each record.
-const FRAMING_BYTES: usize = 9;
+pub(super) const FRAMING_BYTES: usize = 9;
 /// The footer record and the closing magic.
 const TAIL_BYTES: u64 = 9 + 8 + 8 + 4 + 8;
 
@@ -96,8 +96,10 @@ pub(super) enum NoSummary {
     Io(std::io::Error),
     /// The file does not end as MCAP files do.
     CutOff,
-    /// The file ends as it should, but has no summary or a wrong one.
+    /// The file ends as it should and has no summary, or one too large to be held.
     Absent,
+    /// The file ends as it should, but its footer points nowhere.
+    Astray,
     Checksum {
         saved: u32,
         calculated: u32,
@@ -111,29 +113,30 @@ impl Summary {
         let footer_start = size.checked_sub(TAIL_BYTES).ok_or(NoSummary::CutOff)?;
         let mut tail = [0; TAIL_BYTES as usize];
         file.seek(SeekFrom::Start(footer_start)).and_then(|_| file.read_exact(&mut tail)).map_err(NoSummary::Io)?;
-        if !tail.ends_with(mcap::MAGIC) {
-            return Err(NoSummary::CutOff);
-        }
-        let (footer, _) = tail.split_at(tail.len() - mcap::MAGIC.len());
-        let Some((op::FOOTER, content, _)) = Records::new(footer).next() else { return Err(NoSummary::Absent) };
+        let footer = tail.strip_suffix(mcap::MAGIC).ok_or(NoSummary::CutOff)?;
+        let Some((op::FOOTER, content, _)) = Records::new(footer).next() else { return Err(NoSummary::Astray) };
         let start = content.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-        if start == 0 || start > footer_start {
-            return Err(NoSummary::Absent);
+        let is_absent = start == 0 || size.saturating_sub(start) > MAX_RECORD_BYTES as u64;
+        if start > footer_start {
+            return Err(NoSummary::Astray);
+        }
+        if is_absent {
+            let bytes = footer.to_vec();
+            let checked = if start == 0 { Self { start, bytes }.check().map(drop) } else { Ok(()) };
+            return Err(checked.err().unwrap_or(NoSummary::Absent));
         }
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(start)).map_err(NoSummary::Io)?;
         file.take(size - start - mcap::MAGIC.len() as u64).read_to_end(&mut bytes).map_err(NoSummary::Io)?;
-        let summary = Self { start, bytes };
-        summary.check()
+        Self { start, bytes }.check()
     }
 
+    /// Zero says that there is no checksum.
     fn check(self) -> Result<Self, NoSummary> {
-        let (content, saved) = self.bytes.split_last_chunk().ok_or(NoSummary::Absent)?;
-        let (saved, calculated) = (u32::from_le_bytes(*saved), crc32fast::hash(content));
-        if saved != calculated {
-            return Err(NoSummary::Checksum { saved, calculated });
-        }
-        Ok(self)
+        let (content, saved) = self.bytes.split_last_chunk().ok_or(NoSummary::Astray)?;
+        let saved = u32::from_le_bytes(*saved);
+        let calculated = if saved == 0 { 0 } else { crc32fast::hash(content) };
+        if saved == calculated { Ok(self) } else { Err(NoSummary::Checksum { saved, calculated }) }
     }
 
     /// The records of the section, the footer included.

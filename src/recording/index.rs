@@ -1,4 +1,4 @@
-//! What the end of a file says of the file: channels, chunks, counts, metadata and the plan.
+//! What is in a file: channels, counts, metadata and the plan, told by the file's end or found by reading it through.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -6,13 +6,13 @@ use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use mcap::McapError;
-use mcap::records::{ChunkIndex, MessageIndex, Record, Statistics, op};
+use mcap::records::{ChunkIndex, op};
 
 use super::container::{Fields, MAX_RECORD_BYTES, NoSummary, Summary};
 use super::error::{Damage, RecordingError};
 use super::schema::{CameraTopic, SCHEMA_VERSION, Topic};
-use super::sink::{METADATA, PLAN};
-use super::stream::damaged;
+use super::summarised::{self, Summarised};
+use super::survey::survey;
 use crate::artifact::IoError;
 use crate::program::KnownPrograms;
 use crate::task::Family;
@@ -31,12 +31,30 @@ impl Channel {
     }
 }
 
-/// The index of a recording of ours.
-pub(super) struct Index {
-    pub(super) statistics: Statistics,
+/// What is in a file, whoever wrote it.
+#[derive(Default)]
+pub(super) struct Contents {
     /// By channel id.
     pub(super) channels: BTreeMap<u16, Channel>,
+    /// Messages of each channel.
+    pub(super) messages: BTreeMap<u16, u64>,
+    /// Log time of the last message.
+    pub(super) end_nanos: u64,
+    pub(super) n_chunks: u64,
+    /// In the order of the file; empty when the file was read through.
     pub(super) chunks: Vec<ChunkIndex>,
+    /// Of a recording of ours.
+    pub(super) metadata: Option<BTreeMap<String, String>>,
+    /// Of a recording of ours.
+    pub(super) plan_json: Option<String>,
+    /// Log time of each first message of an episode, and where it, or its chunk, begins; `None` when the file was not
+    /// read through.
+    pub(super) starts: Option<Vec<(u64, u64)>>,
+}
+
+/// The contents of a recording of ours.
+pub(super) struct Index {
+    pub(super) contents: Contents,
     pub(super) metadata: BTreeMap<String, String>,
     pub(super) family: Option<Family>,
     pub(super) plan_json: String,
@@ -44,58 +62,23 @@ pub(super) struct Index {
     topics: Vec<Option<Topic>>,
 }
 
-/// Where records lie that are not in chunks: offset and length with framing.
-type Places = BTreeMap<String, (u64, u64)>;
-
 impl Index {
-    /// Reads the index and checks that the file is one that this version can read.
+    /// Reads the index and checks that the file is one that this version can read. A file whose end does not tell
+    /// enough is read through.
     pub(super) fn read(path: &Path, file: &mut File) -> Result<Self, RecordingError> {
         let size = file.metadata().map_err(IoError::system("read", path))?.len();
         check_start(path, file, size)?;
-        let summary = Summary::read(file).map_err(|error| no_summary(path, size, error))?;
-        let mut statistics = None;
-        let mut schemas = BTreeMap::new();
-        let mut channels = BTreeMap::new();
-        let mut chunks = Vec::new();
-        let (mut metadata, mut attachments) = (Places::new(), Places::new());
-        let mut records = summary.records();
-        for (opcode, content, _) in records.by_ref() {
-            // None is in a summary, and the library trusts its lengths.
-            if opcode == op::ATTACHMENT {
-                continue;
-            }
-            match mcap::parse_record(opcode, content).map_err(|error| damaged(path, size, error))? {
-                Record::Statistics(found) => statistics = Some(found),
-                Record::Schema { header, .. } => {
-                    schemas.insert(header.id, header.name);
-                }
-                Record::Channel(mcap::records::Channel {
-                    id, schema_id, topic, message_encoding: encoding, ..
-                }) => {
-                    let schema = schemas.get(&schema_id).cloned().unwrap_or_default();
-                    channels.insert(id, Channel { topic, schema, encoding });
-                }
-                Record::ChunkIndex(chunk) => chunks.push(chunk),
-                Record::MetadataIndex(index) => {
-                    metadata.insert(index.name, (index.offset, index.length));
-                }
-                Record::AttachmentIndex(index) => {
-                    attachments.insert(index.name, (index.offset, index.length));
-                }
-                _ => {}
-            }
-        }
-        if !records.rest().is_empty() {
-            return Err(broken(path, size, "whole record in the summary"));
-        }
-        let place = *metadata.get(METADATA).ok_or_else(|| foreign(path, "metadata record ntp.recording"))?;
-        let metadata = read_metadata(path, file, size, place)?;
+        let told = match Summary::read(file) {
+            Ok(summary) => Summarised::read(path, size, &summary)?.contents(path, file, size)?,
+            Err(NoSummary::Absent) => None,
+            Err(error) => return Err(no_summary(path, size, error)),
+        };
+        let mut contents = told.map_or_else(|| survey(path, file), Ok)?;
+        let metadata = contents.metadata.take().ok_or_else(|| foreign(path, "metadata record ntp.recording"))?;
         let family = check_metadata(path, &metadata)?;
-        let place = *attachments.get(PLAN).ok_or_else(|| foreign(path, "attachment plan.json"))?;
-        let plan_json = read_plan(path, file, size, place)?;
-        let topics = topics(path, &channels)?;
-        let statistics = statistics.ok_or_else(|| broken(path, size, "statistics record"))?;
-        Ok(Self { statistics, channels, chunks, metadata, family, plan_json, topics })
+        let plan_json = contents.plan_json.take().ok_or_else(|| foreign(path, "attachment plan.json"))?;
+        let topics = topics(path, &contents.channels)?;
+        Ok(Self { contents, metadata, family, plan_json, topics })
     }
 
     /// Our topic of a channel, if it is one of ours.
@@ -106,20 +89,20 @@ impl Index {
     pub(super) fn topic(&self, channel: u16, sequence: u32) -> Result<Option<Topic>, Damage> {
         match self.topics.get(usize::from(channel)) {
             Some(Some(topic)) => Ok(Some(*topic)),
-            _ if self.channels.contains_key(&channel) => Ok(None),
+            _ if self.contents.channels.contains_key(&channel) => Ok(None),
             _ => Err(Damage::UnknownChannel { channel, sequence }),
         }
     }
 
     /// The camera and the topic of a channel, if it is a camera's.
     pub(super) fn camera_topic(&self, channel: u16) -> Option<(&str, CameraTopic)> {
-        self.channels.get(&channel)?.camera_topic()
+        self.contents.channels.get(&channel)?.camera_topic()
     }
 
     /// The cameras that have a topic, in the order of their channels.
     pub(super) fn cameras(&self) -> Vec<String> {
         let mut cameras: Vec<String> = Vec::new();
-        for (camera, _topic) in self.channels.keys().filter_map(|&channel| self.camera_topic(channel)) {
+        for (camera, _topic) in self.contents.channels.values().filter_map(Channel::camera_topic) {
             if !cameras.iter().any(|known| known == camera) {
                 cameras.push(camera.to_owned());
             }
@@ -129,32 +112,25 @@ impl Index {
 
     /// How many episodes there are.
     pub(super) fn n_episodes(&self) -> u64 {
-        let starts = self.channels_of(Topic::EpisodeStart);
-        starts.filter_map(|channel| self.statistics.channel_message_counts.get(&channel)).sum()
+        self.start_channels().filter_map(|channel| self.contents.messages.get(&channel)).sum()
     }
 
-    fn channels_of(&self, topic: Topic) -> impl Iterator<Item = u16> {
-        (0..).zip(&self.topics).filter(move |(_, found)| **found == Some(topic)).map(|(id, _)| id)
+    fn start_channels(&self) -> impl Iterator<Item = u16> {
+        (0..).zip(&self.topics).filter(|(_, topic)| **topic == Some(Topic::EpisodeStart)).map(|(id, _)| id)
     }
 
-    /// Start time of each episode and the offset of the chunk it begins in.
+    /// Start time of each episode, and where its first message, or the chunk of it, begins.
     pub(super) fn starts(&self, path: &Path, file: &mut File) -> Result<Vec<(u64, u64)>, RecordingError> {
-        let size = file.metadata().map_err(IoError::system("read", path))?.len();
-        let mut starts = Vec::new();
-        for chunk in &self.chunks {
-            for channel in self.channels_of(Topic::EpisodeStart) {
-                let Some(&offset) = chunk.message_index_offsets.get(&channel) else { continue };
-                let content = read_record(path, file, size, (offset, 0), (op::MESSAGE_INDEX, "message index"))?;
-                let record = mcap::parse_record(op::MESSAGE_INDEX, &content);
-                let Record::MessageIndex(MessageIndex { records, .. }) =
-                    record.map_err(|error| damaged(path, offset, error))?
-                else {
-                    return Err(broken(path, offset, "message index"));
-                };
-                starts.extend(records.iter().map(|entry| (entry.log_time, chunk.chunk_start_offset)));
-            }
+        if let Some(starts) = &self.contents.starts {
+            return Ok(starts.clone());
         }
-        Ok(starts)
+        let channels: Vec<u16> = self.start_channels().collect();
+        let starts = summarised::places(path, file, &self.contents.chunks, &channels)?;
+        // Messages outside of chunks have no index, and those in chunks need none.
+        if starts.len() as u64 == self.n_episodes() {
+            return Ok(starts);
+        }
+        Ok(survey(path, file)?.starts.unwrap_or_default())
     }
 }
 
@@ -175,7 +151,7 @@ fn no_summary(path: &Path, size: u64, error: NoSummary) -> RecordingError {
     match error {
         NoSummary::Io(source) => IoError::system("read", path)(source).into(),
         NoSummary::CutOff => RecordingError::Truncated { path: path.to_owned(), offset: size },
-        NoSummary::Absent => damage(Damage::NoSummary),
+        NoSummary::Absent | NoSummary::Astray => damage(Damage::NoSummary),
         NoSummary::Checksum { saved, calculated } => {
             damage(Damage::Mcap(Box::new(McapError::BadSummaryCrc { saved, calculated })))
         }
@@ -186,12 +162,12 @@ fn foreign(path: &Path, record: &'static str) -> RecordingError {
     RecordingError::Foreign { path: path.to_owned(), record }
 }
 
-fn broken(path: &Path, offset: u64, record: &'static str) -> RecordingError {
+pub(super) fn broken(path: &Path, offset: u64, record: &'static str) -> RecordingError {
     RecordingError::Damaged { path: path.to_owned(), offset, source: Damage::Index { record } }
 }
 
 /// The content of the record at a place. Without a length it is the record's own.
-fn read_record(
+pub(super) fn read_record(
     path: &Path,
     file: &mut File,
     size: u64,
@@ -216,16 +192,6 @@ fn read_record(
         Ok((content.len() as u64 == content_length).then_some(content))
     };
     read(file).map_err(io)?.ok_or_else(|| broken(path, offset, name))
-}
-
-fn read_metadata(
-    path: &Path,
-    file: &mut File,
-    size: u64,
-    place: (u64, u64),
-) -> Result<BTreeMap<String, String>, RecordingError> {
-    let content = read_record(path, file, size, place, (op::METADATA, "metadata record"))?;
-    parse_metadata(&content).ok_or_else(|| broken(path, place.0, "metadata record"))
 }
 
 /// The content of a metadata record: name, size of the map, keys and values.
@@ -258,35 +224,6 @@ pub(super) fn check_metadata(
     }
     let family = metadata.get("task_family").map(|word| word.parse());
     family.transpose().map_err(|_error| foreign(path, "known task_family in its metadata"))
-}
-
-/// Log time, create time, name, media type, length, data, checksum.
-fn read_plan(path: &Path, file: &mut File, size: u64, place: (u64, u64)) -> Result<String, RecordingError> {
-    let content = read_record(path, file, size, place, (op::ATTACHMENT, "attachment"))?;
-    parse_plan(path, place.0, &content)
-}
-
-/// The text of the attachment at an offset, checked.
-pub(super) fn parse_plan(path: &Path, offset: u64, content: &[u8]) -> Result<String, RecordingError> {
-    let broken = || broken(path, offset, "attachment");
-    let (checked, checksum) = content.split_last_chunk().ok_or_else(broken)?;
-    let (saved, calculated) = (u32::from_le_bytes(*checksum), crc32fast::hash(checked));
-    if saved != calculated {
-        return Err(damaged(path, offset, McapError::BadAttachmentCrc { saved, calculated }));
-    }
-    let data = || -> Option<&[u8]> {
-        let mut fields = Fields::new(checked);
-        let (_log_time, _create_time, _name, _media_type) =
-            (fields.u64()?, fields.u64()?, fields.text()?, fields.text()?);
-        let length = fields.u64()?;
-        (length == fields.rest().len() as u64).then_some(fields.rest())
-    };
-    let data = data().ok_or_else(broken)?.to_vec();
-    String::from_utf8(data).map_err(|_error| RecordingError::Damaged {
-        path: path.to_owned(),
-        offset,
-        source: Damage::Text { record: PLAN },
-    })
 }
 
 /// Which of our topics each channel is, when all that a reader needs are there.

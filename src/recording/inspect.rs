@@ -45,7 +45,7 @@ pub struct RecordingInspection {
     pub calls: u64,
     /// Log time of the last message, in nanoseconds: simulated time with the gaps between episodes.
     pub end_nanos: u64,
-    /// Compressed chunks.
+    /// Chunks.
     pub chunks: u64,
     /// Messages of all topics.
     pub messages: u64,
@@ -75,7 +75,7 @@ pub fn inspect(path: &Path) -> Result<RecordingInspection, RecordingError> {
     let mut found = overview(path, &mut file, &index)?;
     let mut tasks = BTreeSet::new();
     Stream::whole(path, file)?.messages(|message| {
-        let &RawMessage { channel, sequence, log_time_nanos, data, offset } = message;
+        let &RawMessage { channel, sequence, log_time_nanos, data, offset, .. } = message;
         let topic = index.topic(channel, sequence).map_err(|source| RecordingError::Damaged {
             path: path.to_owned(),
             offset,
@@ -117,11 +117,11 @@ fn count_end(found: &mut RecordingInspection, end: proto::EpisodeEnd) {
 
 /// What the index tells.
 fn overview(path: &Path, file: &mut File, index: &Index) -> Result<RecordingInspection, RecordingError> {
-    let counts = &index.statistics.channel_message_counts;
-    let topics = index.channels.iter().map(|(id, channel)| TopicInspection {
+    let contents = &index.contents;
+    let topics = contents.channels.iter().map(|(id, channel)| TopicInspection {
         topic: channel.topic.clone(),
         schema: channel.schema.clone(),
-        messages: counts.get(id).copied().unwrap_or_default(),
+        messages: contents.messages.get(id).copied().unwrap_or_default(),
     });
     Ok(RecordingInspection {
         bytes: file.metadata().map_err(IoError::system("read", path))?.len(),
@@ -129,9 +129,9 @@ fn overview(path: &Path, file: &mut File, index: &Index) -> Result<RecordingInsp
         vocabulary_hash: index.metadata.get("vocabulary_hash").cloned().unwrap_or_default(),
         library: index::library(path, file)?,
         family: index.family.map(|family| family.name().to_owned()),
-        end_nanos: index.statistics.message_end_time,
-        chunks: index.chunks.len() as u64,
-        messages: index.statistics.message_count,
+        end_nanos: contents.end_nanos,
+        chunks: contents.n_chunks,
+        messages: contents.messages.values().sum(),
         topics: topics.collect(),
         ..RecordingInspection::default()
     })

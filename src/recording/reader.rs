@@ -29,7 +29,7 @@ pub struct ShardReader {
     assembler: Assembler,
     /// Position of the next episode.
     position: u64,
-    /// Start time of each episode and the offset of its chunk, when one was asked for by position.
+    /// Start time of each episode, and where it or its chunk begins, when one was asked for by position.
     starts: Option<Vec<(u64, u64)>>,
 }
 
@@ -108,8 +108,8 @@ impl ShardReader {
     ///
     /// [`RecordingError::NoSuchEpisode`] behind the last one; else as in iteration, for the chunks that it lies in.
     pub fn read_episode(&mut self, position: u64) -> Result<Episode, RecordingError> {
-        let (start_nanos, chunk_offset) = self.start_of(position)?;
-        let mut stream = Stream::from_chunk(&self.path, open(&self.path)?, chunk_offset)?;
+        let (start_nanos, offset) = self.start_of(position)?;
+        let mut stream = Stream::from_record(&self.path, open(&self.path)?, offset)?;
         let mut assembler = Assembler::default();
         let episode = stream.messages(|message| {
             if message.log_time_nanos < start_nanos {
@@ -253,7 +253,7 @@ fn take(
     episode: u64,
     message: &RawMessage<'_>,
 ) -> Result<ControlFlow<Assembled>, RecordingError> {
-    let &RawMessage { channel, sequence, log_time_nanos, data, offset } = message;
+    let &RawMessage { channel, sequence, log_time_nanos, data, offset, .. } = message;
     let topic = index.topic(channel, sequence).map_err(|source| RecordingError::Damaged {
         path: path.to_owned(),
         offset,

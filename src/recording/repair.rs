@@ -8,18 +8,19 @@ use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{Record, op};
+use mcap::records::op;
 use serde::Serialize;
 
 use super::assembler::{Assembled, Assembler};
-use super::container::Fields;
 use super::decode::check_pictures;
 use super::error::{Damage, RecordingError};
-use super::index::{Channel, check_metadata, parse_metadata, parse_plan};
+use super::index::{Channel, check_metadata, parse_metadata};
+use super::plan::PlanSearch;
 use super::reader::ShardReader;
 use super::schema::Topic;
-use super::sink::{METADATA, PLAN};
+use super::sink::PLAN;
 use super::stream::{RawMessage, Stream, damaged};
+use super::survey::{declare, is_metadata};
 use super::writer::{ShardSummary, ShardWriter};
 use crate::artifact::{IoError, Plan, read_json};
 use crate::trace::Episode;
@@ -63,7 +64,7 @@ pub fn repair(path: &Path, to: &Path) -> Result<RecordingRepair, RecordingError>
     if n_kept == 0 {
         return Err(end.err().unwrap_or(damage));
     }
-    let plan = keep_plan(path, plan, writer)?;
+    let plan = keep_plan(path, plan.finish().unwrap_or_default(), writer)?;
     Ok(RecordingRepair { reason: Some(damage.to_string()), kept: n_kept, plan })
 }
 
@@ -101,23 +102,24 @@ struct Salvage {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
     has_metadata: bool,
-    plan: Option<String>,
+    plan: PlanSearch,
     last_log_time_nanos: u64,
     n_kept: u64,
 }
 
 impl Salvage {
     fn new(path: &Path, to: &Path) -> Result<Self, RecordingError> {
-        // Without an index, the cameras are those that are met.
-        let cameras = ShardReader::open(path).map(|reader| reader.cameras()).unwrap_or_default();
+        // Where no index tells, cameras are those that are met, and the metadata record must be met before the messages.
+        let reader = ShardReader::open(path).ok();
+        let cameras = reader.as_ref().map(ShardReader::cameras).unwrap_or_default();
         Ok(Self {
             path: path.to_owned(),
             writer: ShardWriter::create(to, "{}")?,
             assembler: Assembler::default().with_pictures(cameras),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            has_metadata: false,
-            plan: None,
+            has_metadata: reader.is_some(),
+            plan: PlanSearch::default(),
             last_log_time_nanos: 0,
             n_kept: 0,
         })
@@ -140,17 +142,13 @@ impl Salvage {
             op::METADATA => self.metadata(record, offset),
             op::SCHEMA | op::CHANNEL => self.declaration(opcode, record, offset),
             op::MESSAGE => self.message(record, offset),
-            op::ATTACHMENT => {
-                self.plan = Some(parse_plan(&self.path, offset, record)?);
-                Ok(())
-            }
+            op::ATTACHMENT => self.plan.attachment(&self.path, offset, record),
             _ => Ok(()),
         }
     }
 
     fn metadata(&mut self, record: &[u8], offset: u64) -> Result<(), RecordingError> {
-        let is_ours = Fields::new(record).text() == Some(METADATA.as_bytes());
-        if !is_ours {
+        if !is_metadata(record) {
             return Ok(());
         }
         let source = Damage::Index { record: "metadata record" };
@@ -165,16 +163,8 @@ impl Salvage {
     }
 
     fn declaration(&mut self, opcode: u8, record: &[u8], offset: u64) -> Result<(), RecordingError> {
-        match mcap::parse_record(opcode, record).map_err(|error| damaged(&self.path, offset, error))? {
-            Record::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
-            }
-            Record::Channel(of) => {
-                let schema = self.schemas.get(&of.schema_id).cloned().unwrap_or_default();
-                self.channels.insert(of.id, Channel { topic: of.topic, schema, encoding: of.message_encoding });
-            }
-            _ => {}
-        }
+        let declaration = mcap::parse_record(opcode, record).map_err(|error| damaged(&self.path, offset, error))?;
+        declare(declaration, &mut self.schemas, &mut self.channels);
         Ok(())
     }
 

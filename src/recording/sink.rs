@@ -8,7 +8,6 @@ use prost::Message;
 
 use super::calls::{self, Step};
 use super::cameras::{Cameras, Filmed};
-use super::container::MAX_RECORD_BYTES;
 use super::schema::{CameraTopic, Topic, proto};
 use super::{observation, pushes, start, transform, viewer};
 use crate::artifact::AtomicFile;
@@ -20,7 +19,8 @@ use crate::trace::{Episode, Frame};
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Fixed, because the library's default may change between versions.
 const ZSTD_LEVEL: u32 = 3;
-const HALF_RECORD_BYTES: usize = MAX_RECORD_BYTES / 2;
+/// No message or plan of ours is longer.
+const MAX_CONTENT_BYTES: usize = 32 << 20;
 /// Name of the metadata record.
 pub(super) const METADATA: &str = "ntp.recording";
 /// Name of the attachment that holds the stage's plan.
@@ -213,10 +213,10 @@ impl Sink {
     }
 }
 
-/// What a reader would refuse is not written. Half of its limit leaves room for the rest of a record and of a chunk.
+/// What a reader would refuse is not written: its limit leaves room for the rest of a record and of a chunk.
 fn check_size(opcode: u8, content: &[u8]) -> Result<(), McapError> {
     match content.len() {
-        0..=HALF_RECORD_BYTES => Ok(()),
+        0..=MAX_CONTENT_BYTES => Ok(()),
         len => Err(McapError::RecordTooLarge { opcode, len: len as u64 }),
     }
 }

@@ -4,6 +4,7 @@ mod camera_faults;
 mod cameras;
 mod container;
 mod faults;
+mod layouts;
 mod random;
 
 use std::fs;
