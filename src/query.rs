@@ -16,23 +16,27 @@
 //!
 //! # Errors
 //!
-//! [`QueryError`]: files that are not as their dataset counts them, statements that Polars refuses, answers that a
-//! format cannot hold. No statement makes it panic.
+//! [`QueryError`]: files that are not as their dataset counts them, statements that are not answered, with what to write
+//! instead, statements that Polars refuses, answers that a format cannot hold. No statement makes it panic.
 //!
 //! # Invariants
 //!
-//! Nothing is written but the answer. Only the columns that a statement names are read, and a part of the rows at a
-//! time: groups and sums need memory for themselves alone. An answer is the same with any number of threads: where a
-//! statement asks for no order and groups, joins or makes distinct, rows are sorted by their columns.
+//! Nothing is written but the answer, and no statement changes a table. Only the tables and columns that a statement
+//! names are read, and a part of the rows at a time: groups and sums need memory for themselves alone. An answer is the
+//! same with any number of threads: where a statement asks for no order and groups, joins or makes distinct, rows are
+//! sorted by their columns.
 
 mod answer;
 mod error;
+mod rewrite;
+mod statement;
 mod tables;
 
 use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsResult, SortMultipleOptions};
 use polars::sql::SQLContext;
 
 use crate::table::catch_panic;
+use statement::{Asked, Rows};
 
 pub use answer::Answer;
 pub use error::QueryError;
@@ -44,7 +48,16 @@ pub use tables::{TableInfo, Tables};
 ///
 /// See the module.
 pub fn query(tables: &Tables, sql: &str) -> Result<Answer, QueryError> {
-    let frames = tables.scan()?;
+    let panicked = |words| QueryError::Panic { words };
+    match catch_panic(|| statement::read(sql)).map_err(panicked)?? {
+        Asked::Columns { table } => tables.columns_of(&table),
+        Asked::Tables => tables.listed(),
+        Asked::Rows(rows) => answer(tables, &rows),
+    }
+}
+
+fn answer(tables: &Tables, Rows { sql, relations, has_elements }: &Rows) -> Result<Answer, QueryError> {
+    let frames = tables.scan(|name| relations.contains(name), *has_elements)?;
     let execute = || {
         let mut context = SQLContext::new();
         for (name, frame) in frames {

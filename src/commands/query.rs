@@ -18,7 +18,7 @@ pub(super) fn run(args: &QueryArgs) -> anyhow::Result<CommandOutcome> {
         answer.write_parquet(path)?;
         output::note(&format!("{} rows in {}", answer.n_rows(), path.display()));
     } else if args.json {
-        output::print_json(&answer.to_json())?;
+        output::print_json(&answer.rows())?;
     } else if args.csv {
         output::print(&answer.to_csv()?)?;
     } else {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use polars::prelude::{AnyValue, CsvWriter, DataFrame, ParquetCompression, ParquetWriter, SerWriter as _};
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use crate::artifact::AtomicFile;
@@ -49,15 +50,13 @@ impl Answer {
 
     /// An object for each row. Numbers that are not finite become null: JSON has none.
     pub fn to_json(&self) -> Vec<Value> {
-        let row = |row: usize| {
-            let columns = self.0.columns().iter();
-            let entries = columns.map(|column| {
-                let value = column.get(row).map_or(Value::Null, |value| json(&value));
-                (column.name().to_string(), value)
-            });
-            Value::Object(entries.collect::<Map<_, _>>())
-        };
-        (0..self.n_rows()).map(row).collect()
+        let row = |row| Row { answer: self, row }.entries().map(|(name, value)| (name.to_owned(), value));
+        (0..self.n_rows()).map(|number| Value::Object(row(number).collect::<Map<_, _>>())).collect()
+    }
+
+    /// As [`Answer::to_json`], with the columns of each object in the order that was asked for.
+    pub fn rows(&self) -> impl Serialize + '_ {
+        (0..self.n_rows()).map(|row| Row { answer: self, row }).collect::<Vec<_>>()
     }
 
     /// Comma-separated values with a line of names.
@@ -84,6 +83,28 @@ impl Answer {
         let writer = ParquetWriter::new(&mut file).with_compression(ParquetCompression::Snappy);
         writer.finish(&mut self.0.clone()).map_err(QueryError::Encode)?;
         Ok(file.commit()?)
+    }
+}
+
+/// A row as an object.
+struct Row<'a> {
+    answer: &'a Answer,
+    row: usize,
+}
+
+impl<'a> Row<'a> {
+    fn entries(&self) -> impl Iterator<Item = (&'a str, Value)> + use<'a> {
+        let Self { answer, row } = *self;
+        answer.0.columns().iter().map(move |column| {
+            let value = column.get(row).map_or(Value::Null, |value| json(&value));
+            (column.name().as_str(), value)
+        })
+    }
+}
+
+impl Serialize for Row<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.entries())
     }
 }
 

@@ -6,6 +6,7 @@ use polars::prelude::PolarsError;
 
 use crate::artifact::IoError;
 use crate::dataset::DatasetError;
+use crate::table::TableError;
 
 /// A query without an answer.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +25,41 @@ pub enum QueryError {
         /// What Polars said.
         source: PolarsError,
     },
+    /// No statement.
+    #[error("{words}")]
+    Syntax {
+        /// What the parser said.
+        words: String,
+    },
+    /// A statement of a form that is not answered.
+    #[error("{found} is not answered; {instead}")]
+    NotAnswered {
+        /// The form.
+        found: String,
+        /// What to write instead.
+        instead: String,
+    },
+    /// A table of another name is asked for.
+    #[error("no table {name:?}; tables are {}", tables.join(", "))]
+    NoTable {
+        /// As asked.
+        name: String,
+        /// The tables that there are.
+        tables: Vec<&'static str>,
+    },
+    /// A column of a type that queries do not read.
+    #[error("column {column:?} is {kind}, which queries do not read; other tables can still be asked: {}", path.display())]
+    Type {
+        /// A file of the table.
+        path: PathBuf,
+        /// Which column.
+        column: String,
+        /// Its type.
+        kind: String,
+    },
+    /// A file is no Parquet table.
+    #[error(transparent)]
+    Parquet(#[from] TableError),
     /// The statement was refused, or failed while it was answered.
     #[error("{source}; tables are {}", tables.join(", "))]
     Refused {

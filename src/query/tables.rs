@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{
-    IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, SchemaRef, UnionArgs, concat, lit,
+    Column, DataFrame, DataType, IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, SchemaRef,
+    UnionArgs, col, concat, lit,
 };
 use serde::Serialize;
 
 use crate::dataset;
-use crate::query::QueryError;
+use crate::query::{Answer, QueryError};
+use crate::table::column_types;
 
 /// The table whose columns have become more.
 const ROLLOUTS: &str = "rollouts";
@@ -78,42 +80,107 @@ impl Tables {
         self.0.keys().copied().collect()
     }
 
-    /// The tables with their columns.
+    /// The tables with their columns. The types of a table with a column that queries do not read are those of its
+    /// files.
     ///
     /// # Errors
     ///
     /// When a file cannot be opened.
     pub fn describe(&self) -> Result<Vec<TableInfo>, QueryError> {
-        let frames = self.scan()?;
-        let infos = frames.into_iter().zip(self.0.values()).map(|((table, mut frame), sources)| {
-            let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
-            let schema = frame.collect_schema().map_err(|source| QueryError::Table { path, source })?;
-            let columns = schema.iter().map(|(name, kind)| (name.to_string(), kind.to_string())).collect();
-            Ok(TableInfo { table, files: sources.len(), columns })
-        });
-        infos.collect()
+        self.0.iter().map(|(&table, sources)| info(table, sources)).collect()
     }
 
-    /// Opens every table; no row is read.
-    pub(super) fn scan(&self) -> Result<Vec<(&'static str, LazyFrame)>, QueryError> {
-        let frame = |name: &'static str, sources: &[Source]| match name {
-            ROLLOUTS => scan_rollouts(sources).map_err(|source| unreadable(sources, source)),
-            _ => union(sources),
+    /// The columns of a table as an answer.
+    pub(super) fn columns_of(&self, table: &str) -> Result<Answer, QueryError> {
+        let no_table = || QueryError::NoTable { name: table.to_owned(), tables: self.names() };
+        let (&table, sources) = self.0.get_key_value(table).ok_or_else(no_table)?;
+        let (names, types): (Vec<_>, Vec<_>) = info(table, sources)?.columns.into_iter().unzip();
+        self.listing(vec![Column::new("column".into(), names), Column::new("type".into(), types)])
+    }
+
+    /// The names of the tables as an answer.
+    pub(super) fn listed(&self) -> Result<Answer, QueryError> {
+        self.listing(vec![Column::new("table".into(), self.names())])
+    }
+
+    fn listing(&self, columns: Vec<Column>) -> Result<Answer, QueryError> {
+        let rows = DataFrame::new_infer_height(columns);
+        rows.map(Answer::new).map_err(|source| QueryError::Refused { source, tables: self.names() })
+    }
+
+    /// Opens the tables that are asked for; no row is read. Lists of fixed length become lists of any, of which
+    /// functions and subscripts take elements, if `has_elements`.
+    pub(super) fn scan(
+        &self,
+        is_asked: impl Fn(&str) -> bool,
+        has_elements: bool,
+    ) -> Result<Vec<(&'static str, LazyFrame)>, QueryError> {
+        let asked = self.0.iter().filter(|(name, _)| is_asked(name));
+        let open = |(&name, sources): (&&'static str, &Vec<Source>)| {
+            if let Some(error) = unreadable(sources)? {
+                return Err(error);
+            }
+            let frame = frame(name, sources)?;
+            Ok((name, if has_elements { with_lists(frame, sources)? } else { frame }))
         };
-        self.0.iter().map(|(&name, sources)| Ok((name, frame(name, sources)?))).collect()
+        asked.map(open).collect()
     }
 }
 
+/// Types that Polars, as it is built, cannot hold.
+const UNREAD: [&str; 3] = ["float16", "uint8", "uint16"];
+
+/// Why a table cannot be read, judged by its first file.
+fn unreadable(sources: &[Source]) -> Result<Option<QueryError>, QueryError> {
+    let Some(Source { path, .. }) = sources.first() else { return Ok(None) };
+    let columns = column_types(path)?;
+    let found = columns.into_iter().find_map(|(column, types)| {
+        let kind = types.into_iter().find(|kind| UNREAD.contains(&kind.as_str()))?;
+        Some(QueryError::Type { path: path.clone(), column, kind })
+    });
+    Ok(found)
+}
+
+fn info(table: &'static str, sources: &[Source]) -> Result<TableInfo, QueryError> {
+    let columns = match (unreadable(sources)?, sources.first()) {
+        (Some(_), Some(Source { path, .. })) => {
+            let columns = column_types(path)?.into_iter();
+            columns.map(|(name, types)| (name, types.join(", "))).collect()
+        }
+        _ => {
+            let schema = frame(table, sources)?.collect_schema().map_err(|source| refused(sources, source))?;
+            schema.iter().map(|(name, kind)| (name.to_string(), kind.to_string())).collect()
+        }
+    };
+    Ok(TableInfo { table, files: sources.len(), columns })
+}
+
 /// A table that Polars cannot open, by its first file.
-fn unreadable(sources: &[Source], source: PolarsError) -> QueryError {
-    let path = sources.first().map_or_else(PathBuf::new, |source| source.path.clone());
-    QueryError::Table { path, source }
+fn refused(sources: &[Source], source: PolarsError) -> QueryError {
+    QueryError::Table { path: sources.first().map_or_else(PathBuf::new, |source| source.path.clone()), source }
+}
+
+/// The files of a table of this name as one.
+fn frame(name: &str, sources: &[Source]) -> Result<LazyFrame, QueryError> {
+    match name {
+        ROLLOUTS => scan_rollouts(sources).map_err(|source| refused(sources, source)),
+        _ => union(sources),
+    }
+}
+
+fn with_lists(mut frame: LazyFrame, sources: &[Source]) -> Result<LazyFrame, QueryError> {
+    let schema = frame.collect_schema().map_err(|source| refused(sources, source))?;
+    let lists = schema.iter().filter_map(|(name, kind)| match kind {
+        DataType::Array(inner, _) => Some(col(name.clone()).cast(DataType::List(inner.clone()))),
+        _ => None,
+    });
+    Ok(frame.with_columns(lists.collect::<Vec<_>>()))
 }
 
 /// The files of a table as one. Where they do not say which model they are of, they are read at once: learning curves
 /// are short, and Polars cannot count the rows of a union of lazy frames without its 128-bit numbers.
 fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
-    let unreadable = |source| unreadable(sources, source);
+    let unreadable = |source| refused(sources, source);
     if sources.iter().all(|source| source.model.is_none()) {
         return scan(sources.iter().map(|source| source.path.as_path())).map_err(unreadable);
     }

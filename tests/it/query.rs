@@ -1,9 +1,17 @@
 //! SQL over the tables: counts agree with the writer's, examples are true, and nothing panics.
 
+use std::fs::File;
 use std::path::Path;
+use std::sync::Arc;
 
+use arrow::array::{
+    ArrayRef, Float32Array, Int8Array, Int16Array, Int32Array, RecordBatch, UInt8Array, UInt16Array, UInt32Array,
+};
+use arrow::datatypes::DataType;
 use ntp::dataset::ConvertConfig;
 use ntp::query::{QueryError, Tables, query};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use proptest::prelude::{ProptestConfig, proptest};
 use serde_json::{Value, json};
 
@@ -124,6 +132,171 @@ fn a_dataset_without_one_of_its_files_is_refused() {
     assert!(error.to_string().contains("but the dataset counts 9"), "{error}");
 }
 
+/// How many calls each pair of caller's and callee's programs has, by the episodes themselves.
+fn pairs_of_programs() -> std::collections::BTreeMap<(&'static str, &'static str), usize> {
+    let mut pairs = std::collections::BTreeMap::new();
+    for episode in episodes() {
+        let calls = &episode.calls;
+        for call in calls.iter() {
+            let Some(caller) = call.caller.and_then(|caller| calls.iter().find(|of| of.id == caller)) else { continue };
+            *pairs.entry((caller.program.name(), call.program.name())).or_default() += 1;
+        }
+    }
+    pairs
+}
+
+#[test]
+fn columns_of_one_name_get_names_of_their_own_in_the_order_asked_for() {
+    let (_folder, tables) = small_dataset();
+    let lengths = || episodes().into_iter().map(|episode| episode.boundary_frames().count());
+    let answer = query(&tables, "SELECT MIN(n_frames), MAX(n_frames) FROM episodes").unwrap();
+    let expected = format!("MIN(n_frames),MAX(n_frames)\n{},{}\n", lengths().min().unwrap(), lengths().max().unwrap());
+    assert_eq!(answer.to_csv().unwrap(), expected);
+    let answer = query(&tables, "SELECT program, call_id, depth FROM calls WHERE episode_index = 0 LIMIT 1").unwrap();
+    let json = serde_json::to_string(&answer.rows()).unwrap();
+    assert_eq!(json, r#"[{"program":"block_stacking","call_id":0,"depth":0}]"#);
+}
+
+#[test]
+fn groups_are_ordered_by_what_is_counted_in_them() {
+    let (_folder, tables) = small_dataset();
+    let mut counts = std::collections::BTreeMap::<&str, usize>::new();
+    for episode in episodes() {
+        episode.calls.iter().for_each(|call| *counts.entry(call.program.name()).or_default() += 1);
+    }
+    let mut expected: Vec<(&str, usize)> = counts.into_iter().collect();
+    expected.sort_by_key(|&(program, count)| (std::cmp::Reverse(count), program));
+    let sql = "SELECT program, COUNT(*) FROM calls GROUP BY program ORDER BY COUNT(*) DESC, program";
+    let found = rows(&tables, sql);
+    let expected_rows: Vec<Value> =
+        expected.iter().map(|(program, count)| json!({ "program": program, "COUNT(*)": count })).collect();
+    assert_eq!(found, expected_rows);
+    let sql = "SELECT program FROM calls GROUP BY program ORDER BY COUNT(*) DESC, program LIMIT 2";
+    let expected: Vec<Value> = expected.iter().take(2).map(|(program, _)| json!({ "program": program })).collect();
+    assert_eq!(rows(&tables, sql), expected);
+}
+
+#[test]
+fn a_join_of_a_table_with_itself_is_grouped_by_columns_of_both_sides() {
+    let (_folder, tables) = small_dataset();
+    let pairs: Vec<Value> = pairs_of_programs()
+        .into_iter()
+        .map(|((caller, callee), n)| json!({ "p": caller, "q": callee, "n": n }))
+        .collect();
+    let join = "FROM calls a JOIN calls b ON a.episode_index = b.episode_index AND a.call_id = b.caller_id";
+    let aliased = format!(
+        "SELECT a.program AS p, b.program AS q, COUNT(*) AS n {join} GROUP BY a.program, b.program ORDER BY p, q"
+    );
+    assert_eq!(rows(&tables, &aliased), pairs);
+    let plain = format!(
+        "SELECT a.program, b.program, COUNT(*) {join} GROUP BY a.program, b.program ORDER BY a.program, b.program"
+    );
+    let answer = query(&tables, &plain).unwrap();
+    assert_eq!(answer.n_rows(), pairs.len());
+    assert_eq!(answer.to_csv().unwrap().lines().next(), Some("program,b.program,COUNT(*)"));
+    for ((caller, callee), row) in pairs_of_programs().into_keys().zip(answer.to_json()) {
+        assert_eq!((&row["program"], &row["b.program"]), (&json!(caller), &json!(callee)));
+    }
+}
+
+#[test]
+fn elements_of_lists_are_counted_from_one() {
+    let (_folder, tables) = small_dataset();
+    let whole = rows(&tables, "SELECT action FROM frames WHERE \"index\" = 1");
+    for (position, sql) in [(0, "\"action\"[1]"), (3, "action[4]"), (2, "ARRAY_GET(action, 3)")] {
+        let found = query(&tables, &format!("SELECT {sql} AS x FROM frames WHERE \"index\" = 1")).unwrap();
+        assert_eq!(found.to_json()[0]["x"], whole[0]["action"][position], "{sql}");
+    }
+    let named = query(&tables, "SELECT \"action\"[1] FROM frames LIMIT 1").unwrap();
+    assert_eq!(named.to_csv().unwrap().lines().next(), Some("action[1]"));
+    assert_eq!(rows(&tables, "SELECT action[5] AS x FROM frames LIMIT 1"), [json!({ "x": null })]);
+}
+
+#[test]
+fn a_table_is_described_by_its_columns() {
+    let (_folder, tables) = small_dataset();
+    for sql in ["DESCRIBE tasks", "DESC tasks", "SHOW COLUMNS FROM tasks"] {
+        let found = rows(&tables, sql);
+        assert!(found.contains(&json!({ "column": "task_index", "type": "i64" })), "{sql}: {found:?}");
+        assert_eq!(found.len(), 2, "{sql}");
+    }
+    let error = query(&tables, "DESCRIBE rollouts").err().unwrap().to_string();
+    assert_eq!(error, "no table \"rollouts\"; tables are calls, episodes, frames, scopes, subtasks, tasks");
+    assert_eq!(rows(&tables, "SHOW TABLES")[0], json!({ "table": "calls" }));
+}
+
+#[test]
+fn what_is_not_answered_is_refused_with_what_to_write_instead() {
+    let (_folder, tables) = small_dataset();
+    let refused = |sql: &str| query(&tables, sql).err().unwrap_or_else(|| panic!("{sql} is answered")).to_string();
+    let exists = "SELECT COUNT(*) AS n FROM episodes e WHERE EXISTS (SELECT 1 FROM calls c WHERE c.episode_index = e.episode_index)";
+    assert!(refused(exists).starts_with("EXISTS is not answered; write x IN (SELECT y"), "{}", refused(exists));
+    let instead = "SELECT COUNT(*) AS n FROM episodes WHERE episode_index IN (SELECT episode_index FROM calls)";
+    assert_eq!(rows(&tables, instead), [json!({ "n": episodes().len() })]);
+    for sql in [
+        "DROP TABLE calls",
+        "DELETE FROM calls",
+        "TRUNCATE TABLE calls",
+        "CREATE TABLE x AS SELECT * FROM calls",
+        "INSERT INTO calls VALUES (1)",
+        "UPDATE calls SET depth = 0",
+        "SELECT * INTO x FROM calls",
+    ] {
+        assert!(refused(sql).contains("tables are only read"), "{sql}: {}", refused(sql));
+    }
+    assert!(refused("SELECT 1; SELECT 2").starts_with("more than one statement"));
+    assert!(refused("").starts_with("an empty statement"));
+}
+
+#[test]
+fn a_column_of_a_type_that_is_not_read_is_named_and_other_tables_are_answered() {
+    let (folder, _) = small_dataset();
+    let path = folder.path().join("data/chunk-000/file-000.parquet");
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap().build().unwrap();
+    let batches: Vec<RecordBatch> = reader.map(Result::unwrap).collect();
+    let with = |name: &str, column: fn(usize) -> ArrayRef| {
+        let widened = |batch: &RecordBatch| {
+            let added = (name.to_owned(), column(batch.num_rows()));
+            let own = batch.schema().fields().iter().map(|field| field.name().clone()).collect::<Vec<_>>();
+            RecordBatch::try_from_iter(own.into_iter().zip(batch.columns().to_vec()).chain([added])).unwrap()
+        };
+        let widened: Vec<RecordBatch> = batches.iter().map(widened).collect();
+        let mut writer = ArrowWriter::try_new(File::create(&path).unwrap(), widened[0].schema(), None).unwrap();
+        widened.iter().for_each(|batch| writer.write(batch).unwrap());
+        writer.close().unwrap();
+        let mut tables = Tables::default();
+        tables.add_dataset(folder.path()).unwrap();
+        tables
+    };
+    let n_frames = batches.iter().map(RecordBatch::num_rows).sum::<usize>();
+    let unread: [(&str, fn(usize) -> ArrayRef); 3] = [
+        ("float16", |n| arrow::compute::cast(&Float32Array::from(vec![1.0; n]), &DataType::Float16).unwrap()),
+        ("uint8", |n| Arc::new(UInt8Array::from(vec![1; n]))),
+        ("uint16", |n| Arc::new(UInt16Array::from(vec![1; n]))),
+    ];
+    for (kind, column) in unread {
+        let tables = with("extra", column);
+        assert_eq!(rows(&tables, "SELECT COUNT(*) AS n FROM episodes"), [json!({ "n": episodes().len() })]);
+        let error = query(&tables, "SELECT COUNT(*) AS n FROM frames").err().unwrap().to_string();
+        assert!(error.starts_with(&format!("column \"extra\" is {kind}, which queries do not read")), "{error}");
+        let described = rows(&tables, "DESCRIBE frames");
+        assert!(described.contains(&json!({ "column": "extra", "type": kind })), "{described:?}");
+        assert_eq!(tables.describe().unwrap().len(), 6);
+    }
+    let read: [fn(usize) -> ArrayRef; 4] = [
+        |n| Arc::new(Int8Array::from(vec![1; n])),
+        |n| Arc::new(Int16Array::from(vec![1; n])),
+        |n| Arc::new(Int32Array::from(vec![1; n])),
+        |n| Arc::new(UInt32Array::from(vec![1; n])),
+    ];
+    for column in read {
+        let tables = with("extra", column);
+        let sql = "SELECT SUM(extra) AS s, MAX(extra + 1) AS m FROM frames WHERE extra > 0";
+        assert_eq!(rows(&tables, sql), [json!({ "s": n_frames, "m": 2 })]);
+        assert_eq!(rows(&tables, "SELECT extra, COUNT(*) AS n FROM frames GROUP BY extra").len(), 1);
+    }
+}
+
 /// The statements of the page of examples.
 fn examples() -> Vec<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/queries.md");
@@ -164,9 +337,39 @@ fn every_example_of_the_page_is_answered_with_rows() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("nothing"));
 }
 
-const WORDS: [&str; 24] = [
-    "SELECT", "*", "FROM", "calls", "frames", "WHERE", "(", ")", ",", "program", "'pick'", "=", "GROUP BY", "COUNT(*)",
-    "ORDER BY", "depth", "LIMIT", "0", "-1", "JOIN", "ON", "AS", "x", "\"",
+const WORDS: [&str; 32] = [
+    "SELECT",
+    "*",
+    "FROM",
+    "calls",
+    "frames",
+    "WHERE",
+    "(",
+    ")",
+    ",",
+    "program",
+    "'pick'",
+    "=",
+    "GROUP BY",
+    "COUNT(*)",
+    "ORDER BY",
+    "depth",
+    "LIMIT",
+    "0",
+    "-1",
+    "JOIN",
+    "ON",
+    "AS",
+    "x",
+    "\"",
+    "x.program",
+    "[1]",
+    "DESCRIBE",
+    "EXISTS",
+    "SUM(depth)",
+    "HAVING",
+    "UNION",
+    ";",
 ];
 
 #[test]
@@ -175,7 +378,7 @@ fn no_statement_panics() {
     proptest!(ProptestConfig::with_cases(128), |(words in proptest::collection::vec(0..WORDS.len(), 0..14))| {
         let sql = words.into_iter().map(|word| WORDS[word]).collect::<Vec<_>>().join(" ");
         if let Ok(answer) = query(&tables, &sql) {
-            assert!(answer.to_text().contains("row"));
+            assert!(answer.to_text().contains("row"), "{sql}");
         }
     });
 }
