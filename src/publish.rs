@@ -34,6 +34,7 @@ mod facts;
 mod files;
 mod folder;
 mod license;
+mod origin;
 mod provenance;
 mod publication;
 mod tables;
@@ -58,8 +59,6 @@ pub use license::{License, UnknownLicense};
 pub use publication::{NoRelease, Publication, Release};
 
 /// Words under which the dataset is found.
-const TAGS: [&str; 6] =
-    ["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning", "synthetic"];
 const CARD: &str = "README.md";
 const CROISSANT: &str = "croissant.json";
 const UPLOAD: (&str, &str) = ("upload.sh", include_str!("publish/upload.sh"));

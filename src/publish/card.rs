@@ -4,7 +4,7 @@ use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use crate::publish::tables::TableFacts;
-use crate::publish::{Facts, Publication, TAGS};
+use crate::publish::{Facts, Publication};
 
 const TEMPLATE: &str = include_str!("card.md.j2");
 
@@ -38,7 +38,7 @@ pub(super) fn render(facts: &Facts, publication: &Publication) -> Result<Vec<u8>
         license_url: publication.license.url(),
         date: publication.date.to_string(),
         release: publication.release.to_string(),
-        tags: &TAGS,
+        tags: facts.tags,
         size: size_category(facts.summary.total_frames),
         facts,
         tables: &facts.tables,

@@ -25,11 +25,11 @@ pub(super) fn render(facts: &Facts, publication: &Publication, files: &[FileEntr
         "name": publication.name,
         "description": facts.description,
         "license": publication.license.url(),
-        "creator": publication.creators().map(|name| json!({ "@type": "sc:Organization", "name": name })).collect::<Vec<_>>(),
+        "creator": facts.creators.iter().map(|name| json!({ "@type": "sc:Organization", "name": name })).collect::<Vec<_>>(),
         "datePublished": publication.date.to_string(),
         "version": publication.release.to_string(),
         "inLanguage": "en",
-        "keywords": super::TAGS,
+        "keywords": facts.tags,
         "citeAs": facts.cite_as,
         "isLiveDataset": false,
         "prov:wasGeneratedBy": {

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::dataset::{DatasetSummary, summarize};
+use crate::publish::origin::Origin;
 use crate::publish::provenance::{Provenance, SourceFacts};
 use crate::publish::tables::{TableFacts, tables};
 use crate::publish::{Publication, PublishError};
@@ -28,6 +29,20 @@ pub(super) struct Facts {
     pub(super) tables: Vec<TableFacts>,
     /// One sentence or two on what it is.
     pub(super) description: String,
+    /// Where the labels are from.
+    pub(super) labels_words: String,
+    /// Who acted, and where.
+    pub(super) acting_words: &'static str,
+    /// What the splits are.
+    pub(super) splits_words: &'static str,
+    /// What is said of settings where none are at hand.
+    pub(super) settings_words: &'static str,
+    /// Tags at the hub.
+    pub(super) tags: &'static [&'static str],
+    /// The hub's word for who made the labels.
+    pub(super) annotations_creators: &'static str,
+    /// Whose it is.
+    pub(super) creators: Vec<String>,
     /// Which frames are rows, in words.
     pub(super) frames_words: &'static str,
     /// How often whoever acted succeeded, in words.
@@ -56,20 +71,29 @@ impl Facts {
         let summary = summarize(dataset)?;
         let provenance = Provenance::of(dataset)?;
         let pipeline = provenance.pipeline(&publication.slug());
-        let cite_as = citation(publication);
+        let origin = Origin::of(dataset)?;
+        let creators = creators(&origin, publication);
+        let cite_as = citation(publication, &creators);
         let left_out = match pipeline {
             Some(_) => Vec::new(),
             // Its own plan tells of each of them how it was made.
-            None if !provenance.sources().is_empty() => Vec::new(),
+            None if !provenance.sources().is_empty() || origin != Origin::Simulated => Vec::new(),
             None => vec!["pipeline.toml: the recordings and tasks of the dataset do not lie beside it".to_owned()],
         };
         Ok(Self {
             tables: tables(dataset, &summary)?,
-            description: description(&summary),
+            description: origin.description(&summary),
+            labels_words: origin.labels(),
+            acting_words: origin.acting(),
+            splits_words: origin.splits(),
+            settings_words: origin.unknown_settings(),
+            tags: origin.tags(),
+            annotations_creators: origin.annotations_creators(),
+            creators,
             frames_words: frames_words(&summary),
-            success_words: success_words(&summary, &provenance),
-            limits: limits(&summary),
-            command: provenance.command(),
+            success_words: success_words(&origin, &summary, &provenance),
+            limits: origin.limits(&summary),
+            command: provenance.command().unwrap_or_else(|| origin.command().to_owned()),
             sources: provenance.sources(),
             import_sha256: provenance.import_sha256().map(ToOwned::to_owned),
             bibtex: format!("{cite_as}\n{PAPER}"),
@@ -82,22 +106,6 @@ impl Facts {
     }
 }
 
-fn families(summary: &DatasetSummary) -> String {
-    summary.families.iter().map(|family| family.replace('_', " ")).collect::<Vec<_>>().join(", ")
-}
-
-fn description(summary: &DatasetSummary) -> String {
-    let actors: Vec<String> = summary.actors.iter().map(|(actor, episodes)| format!("{episodes} by {actor}")).collect();
-    format!(
-        "{} simulated robot episodes ({}) of {} tasks of {}, with the hierarchy of programs that acted them: true \
-         labels of every program call, its arguments, and the part of the demonstration it was given.",
-        summary.total_episodes,
-        actors.join(", "),
-        summary.total_tasks,
-        families(summary)
-    )
-}
-
 fn frames_words(summary: &DatasetSummary) -> &'static str {
     if summary.frames == "boundaries" {
         "one at the end of each primitive, and the first"
@@ -106,55 +114,32 @@ fn frames_words(summary: &DatasetSummary) -> &'static str {
     }
 }
 
-fn success_words(summary: &DatasetSummary, provenance: &Provenance) -> String {
-    let share = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
-    let successes = summary.outcomes.get("success").copied().unwrap_or(0);
+fn success_words(origin: &Origin, summary: &DatasetSummary, provenance: &Provenance) -> String {
     let all = summary.total_episodes + summary.failed_left_out;
-    let mut words = format!("{successes} of {all} episodes succeeded ({:.1} %).", share(successes, all));
+    let mut words = origin.success(summary);
     if let Some((episodes, failed)) = provenance.demonstrated().filter(|(episodes, _)| *episodes == all) {
         words.push_str(&format!(" The recordings say the same: {failed} of {episodes} failed in physics."));
     }
     words
 }
 
-fn limits(summary: &DatasetSummary) -> Vec<String> {
-    let mut limits = vec![
-        "Simulated: rigid bodies, a gripper without an arm, known poses. Nothing of it was measured on a robot."
-            .to_owned(),
-        format!(
-            "`timestamp` is regular at {} frames a second, as LeRobot wants; the simulation's own time is \
-             `ntp.time_secs`.",
-            summary.fps
-        ),
-        "Observations are positions of slots, relative to the gripper.".to_owned(),
-    ];
-    if summary.frames == "boundaries" {
-        limits.push(
-            "Frames between the ends of primitives are not in the tables: motions have no intermediate states."
-                .to_owned(),
-        );
+/// Whose it is.
+fn creators(origin: &Origin, publication: &Publication) -> Vec<String> {
+    match publication.creators.as_slice() {
+        [] => vec![origin.default_creator().to_owned()],
+        named => named.to_vec(),
     }
-    if summary.failed_left_out > 0 {
-        limits.push(format!(
-            "{} episodes that failed were left out: what is here is better than what acted.",
-            summary.failed_left_out
-        ));
-    }
-    if !summary.splits.contains_key("unseen") {
-        limits.push("It has no episode of an unseen task: how well a learner generalizes shows elsewhere.".to_owned());
-    }
-    limits
 }
 
 /// How the dataset itself is cited.
-fn citation(publication: &Publication) -> String {
+fn citation(publication: &Publication, creators: &[String]) -> String {
     let url = publication.url.as_ref().map(|url| format!("\n  url     = {{{url}}},")).unwrap_or_default();
     format!(
         "@misc{{{},\n  title   = {{{}}},\n  author  = {{{}}},\n  year    = {{{}}},{url}\n  note    = {{Release {}, made \
          with ntp {}: Neural Task Programming as a dataset pipeline}}\n}}\n",
         publication.slug(),
         publication.name,
-        publication.creators().collect::<Vec<_>>().join(" and "),
+        creators.join(" and "),
         publication.date.year(),
         publication.release,
         env!("CARGO_PKG_VERSION")

@@ -59,19 +59,15 @@ impl Provenance {
         toml::to_string(&toml::Value::try_from(without_nulls(spec)).ok()?).ok()
     }
 
-    /// The command that made it, as far as the plans tell.
-    pub(super) fn command(&self) -> String {
+    /// The command that made it; `None` when the plans do not tell.
+    pub(super) fn command(&self) -> Option<String> {
         let sources = self.sources();
-        match &self.dataset {
-            Some(_) if self.recordings.is_some() && self.tasks.is_some() => {
-                "ntp run pipeline.toml --out RUN --to convert".to_owned()
-            }
-            Some(plan) if !sources.is_empty() => {
-                let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
-                format!("ntp dataset {} {}", plan.stage, names.join(" "))
-            }
-            _ => "ntp convert PIPELINE.toml".to_owned(),
+        let plan = self.dataset.as_ref()?;
+        if self.recordings.is_some() && self.tasks.is_some() {
+            return Some("ntp run pipeline.toml --out RUN --to convert".to_owned());
         }
+        let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("ntp dataset {} {}", plan.stage, names.join(" ")))
     }
 
     /// The datasets that it was made of, where it was made of datasets.

@@ -14,7 +14,7 @@ pub struct Publication {
     pub date: Date,
     /// What it is called.
     pub name: String,
-    /// Whose it is; the project's when empty.
+    /// Whose it is; when empty the project's, if the project made it.
     pub creators: Vec<String>,
     /// Where it can be found.
     pub url: Option<String>,
@@ -61,12 +61,6 @@ impl fmt::Display for Release {
 }
 
 impl Publication {
-    /// Whose it is.
-    pub(super) fn creators(&self) -> impl Iterator<Item = &str> {
-        let project = self.creators.is_empty().then_some("The ntp project");
-        self.creators.iter().map(String::as_str).chain(project)
-    }
-
     /// `owner/name` of an address at the Hugging Face hub.
     pub(super) fn repository(&self) -> Option<&str> {
         let rest = self.url.as_deref()?.strip_prefix("https://huggingface.co/datasets/")?.trim_end_matches('/');

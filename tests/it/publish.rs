@@ -256,3 +256,37 @@ fn a_dataset_made_of_datasets_names_them_on_its_card() {
     assert!(card.contains("ntp dataset split dataset") && card.contains("| dataset | `"), "{card}");
     assert!(card.contains("| 0 to 4 |"), "{card}");
 }
+
+/// Of data of others only what their files tell.
+#[test]
+fn the_card_of_a_dataset_that_was_annotated_elsewhere_claims_nothing_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (theirs, imported, to) =
+        (folder.path().join("theirs"), folder.path().join("imported"), folder.path().join("to"));
+    crate::import::theirs(&theirs);
+    ntp::dataset::import::import(&theirs, &imported).unwrap();
+    let publication = Publication { creators: Vec::new(), ..publication() };
+    publish(&imported, &Folder::new(&to), &publication, || true).unwrap();
+    let card = std::fs::read_to_string(to.join("README.md")).unwrap();
+    let metadata: Value = serde_json::from_slice(&std::fs::read(to.join("croissant.json")).unwrap()).unwrap();
+    let metadata =
+        ["description", "keywords", "creator", "citeAs", "prov:wasGeneratedBy"].map(|key| metadata[key].to_string());
+    // What columns mean is said of every dataset with these tables.
+    let (before, rest) = card.split_once("## Tables").unwrap();
+    let prose = [before, rest.split_once("## Limits").unwrap().1, &metadata.concat()].concat();
+    for claimed in
+        ["simulated", "synthetic", "guessed", "machine-generated", "rapier", "The ntp project", "ntp convert", "unseen"]
+    {
+        assert!(!prose.contains(claimed), "{claimed}: {prose}");
+    }
+    for told in [
+        "annotations_creators:\n- found\n",
+        "These labels are `subtask_index` as it was annotated elsewhere.",
+        "`ntp dataset import THEIRS`",
+        "The accuracy of the labels was not measured.",
+        "Demonstrations are taken for successes: nobody has judged them.",
+        "Unknown: the authors of the dataset that it was brought in from",
+    ] {
+        assert!(card.contains(told), "{told}: {card}");
+    }
+}

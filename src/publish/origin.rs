@@ -1,0 +1,191 @@
+//! What may be said of a dataset by where it is from. Nothing is claimed of others' data that their files do not tell.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::artifact::{IoError, read_json};
+use crate::dataset::DatasetSummary;
+
+/// Where episodes and labels are from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub(super) enum Origin {
+    /// A program acted in the simulation, and its calls are the labels.
+    Simulated,
+    /// A dataset of others was brought in; the labels are what it had annotated.
+    Annotated {
+        /// By which column.
+        column: String,
+    },
+}
+
+/// The part of `ntp/info.json` that tells.
+#[derive(Deserialize)]
+struct Told {
+    #[serde(default)]
+    annotated_by: Option<String>,
+}
+
+impl Origin {
+    /// That of a dataset.
+    pub(super) fn of(dataset: &Path) -> Result<Self, IoError> {
+        let told: Told = read_json(&dataset.join("ntp/info.json"))?;
+        Ok(told.annotated_by.map_or(Self::Simulated, |column| Self::Annotated { column }))
+    }
+
+    pub(super) fn tags(&self) -> &'static [&'static str] {
+        match self {
+            Self::Simulated => {
+                &["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning", "synthetic"]
+            }
+            Self::Annotated { .. } => &["LeRobot", "robotics", "hierarchical", "imitation-learning"],
+        }
+    }
+
+    /// The hub's word for who made the labels.
+    pub(super) fn annotations_creators(&self) -> &'static str {
+        match self {
+            Self::Simulated => "machine-generated",
+            Self::Annotated { .. } => "found",
+        }
+    }
+
+    /// One sentence or two on what the dataset is.
+    pub(super) fn description(&self, summary: &DatasetSummary) -> String {
+        let DatasetSummary { total_episodes, total_tasks, .. } = summary;
+        match self {
+            Self::Simulated => {
+                let actors = summary.actors.iter().map(|(actor, episodes)| format!("{episodes} by {actor}"));
+                let families = summary.families.iter().map(|family| family.replace('_', " "));
+                format!(
+                    "{total_episodes} simulated robot episodes ({}) of {total_tasks} tasks of {}, with the hierarchy of \
+                     programs that acted them: true labels of every program call, its arguments, and the part of the \
+                     demonstration it was given.",
+                    actors.collect::<Vec<_>>().join(", "),
+                    families.collect::<Vec<_>>().join(", ")
+                )
+            }
+            Self::Annotated { column } => format!(
+                "{total_episodes} robot episodes of {total_tasks} tasks, with their annotated sub-tasks as a program tree \
+                 of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
+            ),
+        }
+    }
+
+    /// Where the labels are from.
+    pub(super) fn labels(&self) -> String {
+        match self {
+            Self::Simulated => "Every episode comes with the program that made it: which program called which, with what \
+                                argument, on which part of the demonstration, and when it ended. None of these labels was \
+                                guessed or drawn by hand; they are the calls of the program that acted."
+                .to_owned(),
+            Self::Annotated { column } => format!(
+                "Every episode is a call of the root program `task`, and each run of frames of one sub-task is a call below \
+                 it. These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
+                 how, or how exactly."
+            ),
+        }
+    }
+
+    /// Who acted, and where.
+    pub(super) fn acting(&self) -> &'static str {
+        match self {
+            Self::Simulated => {
+                "A scripted expert or a policy acted in a rigid-body simulation (rapier3d); who it was is in `episodes.actor`."
+            }
+            Self::Annotated { .. } => {
+                "Episodes, videos and statistics are those of the dataset that it was brought in from. Its files do not \
+                 tell whether a robot or a simulation acted."
+            }
+        }
+    }
+
+    /// What the splits are.
+    pub(super) fn splits(&self) -> &'static str {
+        match self {
+            Self::Simulated => {
+                "A task is `seen` or `unseen` as a whole, decided when tasks are drawn and checked on the canonical goal: no \
+                 end configuration of an unseen task is among the seen ones. Demonstrations are made of seen tasks; unseen \
+                 ones are for evaluation. The column is `episodes.split`, and a task has one split in all of its episodes."
+            }
+            Self::Annotated { .. } => {
+                "The column is `episodes.split`. Nothing holds tasks of one split apart from those of another."
+            }
+        }
+    }
+
+    /// How often whoever acted succeeded, where it was told.
+    pub(super) fn success(&self, summary: &DatasetSummary) -> String {
+        let successes = summary.outcomes.get("success").copied().unwrap_or(0);
+        let all = summary.total_episodes + summary.failed_left_out;
+        match self {
+            Self::Simulated => {
+                let share = 100.0 * successes as f64 / all.max(1) as f64;
+                format!("{successes} of {all} episodes succeeded ({share:.1} %).")
+            }
+            Self::Annotated { .. } => "Demonstrations are taken for successes: nobody has judged them.".to_owned(),
+        }
+    }
+
+    pub(super) fn limits(&self, summary: &DatasetSummary) -> Vec<String> {
+        let fps = summary.fps;
+        let own: Vec<String> = match self {
+            Self::Simulated => vec![
+                "Simulated: rigid bodies, a gripper without an arm, known poses. Nothing of it was measured on a robot."
+                    .to_owned(),
+                format!(
+                    "`timestamp` is regular at {fps} frames a second, as LeRobot wants; the simulation's own time is \
+                     `ntp.time_secs`."
+                ),
+                "Observations are positions of slots, relative to the gripper.".to_owned(),
+            ],
+            Self::Annotated { .. } => vec![
+                "The accuracy of the labels was not measured.".to_owned(),
+                "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
+                format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
+            ],
+        };
+        let boundaries =
+            "Frames between the ends of primitives are not in the tables: motions have no intermediate states.";
+        let unseen = "It has no episode of an unseen task: how well a learner generalizes shows elsewhere.";
+        let left_out = summary.failed_left_out;
+        let left_out_words =
+            format!("{left_out} episodes that failed were left out: what is here is better than what acted.");
+        let is_simulated = *self == Self::Simulated;
+        let further = [
+            (summary.frames == "boundaries", boundaries.to_owned()),
+            (left_out > 0, left_out_words),
+            (is_simulated && !summary.splits.contains_key("unseen"), unseen.to_owned()),
+        ];
+        own.into_iter().chain(further.into_iter().filter(|(holds, _)| *holds).map(|(_, words)| words)).collect()
+    }
+
+    /// Who is named where the publisher names nobody.
+    pub(super) fn default_creator(&self) -> &'static str {
+        match self {
+            Self::Simulated => "The ntp project",
+            Self::Annotated { .. } => "Unknown: the authors of the dataset that it was brought in from",
+        }
+    }
+
+    /// The command that made it, where no plan tells.
+    pub(super) fn command(&self) -> &'static str {
+        match self {
+            Self::Simulated => "ntp convert PIPELINE.toml",
+            Self::Annotated { .. } => "ntp dataset import THEIRS",
+        }
+    }
+
+    /// What is said where no plan is at hand.
+    pub(super) fn unknown_settings(&self) -> &'static str {
+        match self {
+            Self::Simulated => {
+                "The recordings and tasks behind it were not at hand when it was published, so the settings that made them \
+                 are not told here."
+            }
+            Self::Annotated { .. } => {
+                "`ntp/episodes.parquet` names the file that each episode was read from, by name and hash."
+            }
+        }
+    }
+}
