@@ -42,6 +42,7 @@ impl StagedDir {
     ///
     /// When there is something at `path`, or another process makes the same folder.
     pub fn begin(path: &Path) -> Result<Self, StagingError> {
+        let path = &behind_links(path)?;
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let partial = path.with_file_name(format!("{PARTIAL_PREFIX}{name}"));
         let lock = RunLock::take(&partial)?;
@@ -93,6 +94,14 @@ impl Drop for StagedDir {
             // Nothing is left to do when the system refuses: the next command of the kind tries again.
             let _refused = std::fs::remove_dir_all(&self.partial);
         }
+    }
+}
+
+/// Where a folder that is there is, behind links and `.`: only under its own name can another take its place.
+fn behind_links(path: &Path) -> Result<PathBuf, IoError> {
+    match std::fs::canonicalize(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(path.to_owned()),
+        found => found.map_err(IoError::system("find", path)),
     }
 }
 

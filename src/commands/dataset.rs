@@ -23,7 +23,20 @@ pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
     }
 }
 
+/// Refuses a folder within a dataset that is read: it would become a part of it.
+fn refuse_within(source: &Path, to: &Path) -> Result<(), UsageError> {
+    let there = std::path::absolute(to).ok();
+    let there = there.and_then(|to| to.ancestors().find_map(|path| path.canonicalize().ok()));
+    let (Ok(source), Some(there)) = (source.canonicalize(), there) else { return Ok(()) };
+    if there.starts_with(&source) {
+        let (to, source) = (to.display(), source.display());
+        return Err(UsageError(format!("--to {to} lies within {source}, which is read; choose a folder elsewhere")));
+    }
+    Ok(())
+}
+
 fn run_merge(args: &MergeArgs) -> anyhow::Result<CommandOutcome> {
+    args.sources.iter().try_for_each(|source| refuse_within(source, &args.to))?;
     let summary = merge(&args.sources, &args.to)?;
     tell(&[(&args.to, &summary)], args.json)
 }
@@ -44,6 +57,7 @@ fn run_filter(args: &FilterArgs) -> anyhow::Result<CommandOutcome> {
         )
         .into());
     }
+    refuse_within(&args.dataset, &args.to)?;
     let summary = filter(&args.dataset, &condition, &args.to)?;
     tell(&[(&args.to, &summary)], args.json)
 }
@@ -60,6 +74,7 @@ fn run_split(args: &SplitArgs) -> anyhow::Result<CommandOutcome> {
             seed: args.seed,
         },
     };
+    refuse_within(&args.dataset, &args.to)?;
     let parts = split(&args.dataset, &by, &args.to)?;
     let parts: Vec<_> = parts.into_iter().map(|(name, summary)| (args.to.join(name), summary)).collect();
     tell(&parts.iter().map(|(path, summary)| (path.as_path(), summary)).collect::<Vec<_>>(), args.json)
@@ -98,6 +113,7 @@ fn run_diff(args: &DiffArgs) -> anyhow::Result<CommandOutcome> {
 }
 
 fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
+    refuse_within(&args.dataset, &args.to)?;
     let written = export(&args.dataset, args.labels, &args.to)?;
     if args.json {
         output::print_json(&json!({ "path": args.to, "labels": args.labels, "summary": written }))?;
@@ -109,6 +125,7 @@ fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
 }
 
 fn run_import(args: &ImportArgs) -> anyhow::Result<CommandOutcome> {
+    refuse_within(&args.dataset, &args.to)?;
     let written = import(&args.dataset, &args.to)?;
     if args.json {
         output::print_json(&json!({ "path": args.to, "summary": written }))?;

@@ -26,6 +26,45 @@ fn a_stage_that_does_not_exist_is_refused_with_those_that_do() {
 }
 
 #[test]
+fn a_first_stage_behind_the_last_is_refused() {
+    let output = ntp().args(["run", "pipelines/smoke.toml", "--from", "report", "--to", "tasks"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("--from report comes behind --to tasks; the stages are tasks, generate"), "{text}");
+}
+
+#[test]
+fn a_folder_is_made_behind_a_link_and_in_place_of_the_current_one_but_not_within_what_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    ntp().args(["run", "pipelines/smoke.toml", "--to", "convert", "--out"]).arg(&out).assert().success();
+    let dataset = out.join("dataset");
+    let [target, link, here] = ["target", "link", "here"].map(|name| folder.path().join(name));
+    std::fs::create_dir(&target).unwrap();
+    std::fs::create_dir(&here).unwrap();
+    std::os::unix::fs::symlink(&target, &link).unwrap();
+    let filter = |to: &std::path::Path| {
+        let mut command = ntp();
+        command
+            .current_dir(&here)
+            .args(["dataset", "filter"])
+            .arg(&dataset)
+            .args(["--min-frames", "1", "--to"])
+            .arg(to);
+        command.output().unwrap()
+    };
+    for (to, made) in [(link.as_path(), &target), (std::path::Path::new("."), &here)] {
+        let output = filter(to);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        ntp().arg("validate").arg(made).assert().success();
+    }
+    let within = filter(&dataset.join("videos/new"));
+    assert_eq!(within.status.code(), Some(2));
+    assert!(String::from_utf8(within.stderr).unwrap().contains("which is read; choose a folder elsewhere"));
+    assert!(!dataset.join("videos/new").exists() && link.is_symlink());
+}
+
+#[test]
 fn something_that_is_nothing_of_ours_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let output = ntp().arg("inspect").arg(folder.path()).output().unwrap();
