@@ -19,6 +19,7 @@ mod h264;
 mod jpeg;
 mod lanes;
 mod mp4;
+mod picture;
 mod png;
 mod seek;
 
@@ -29,5 +30,6 @@ pub use gif::encode_gif;
 pub use h264::{H264Decoder, H264Encoder, is_key_frame};
 pub use jpeg::encode_jpeg;
 pub use mp4::{Mp4Reader, Mp4Sample, Mp4Writer};
+pub use picture::{decode_picture, picture_size};
 pub use png::{Rgb, decode_png, encode_png};
 pub use seek::Mp4Pictures;

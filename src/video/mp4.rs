@@ -49,7 +49,15 @@ impl Mp4Writer {
     ///
     /// When the first one has no parameter sets.
     pub fn write(&mut self, packet: &[u8]) -> Result<(), VideoError> {
-        let seconds = self.n_samples as f64 / f64::from(self.fps);
+        self.write_at(self.n_samples as f64 / f64::from(self.fps), packet)
+    }
+
+    /// Adds a packet that is shown at a time of its own, in seconds from the file's beginning, behind those before.
+    ///
+    /// # Errors
+    ///
+    /// As [`Mp4Writer::write`], and when the time is not behind.
+    pub fn write_at(&mut self, seconds: f64, packet: &[u8]) -> Result<(), VideoError> {
         let written = self.muxer.write_video(seconds, packet, is_key_frame(packet));
         written.map_err(|error| container(&self.path, &error))?;
         self.n_samples += 1;
