@@ -29,6 +29,7 @@ pub mod export;
 mod files;
 pub mod import;
 mod pictures;
+pub(crate) mod plain;
 mod read;
 pub mod schema;
 mod statistics;

@@ -2,7 +2,7 @@
 
 use crate::dataset::pictures::PictureStatistics;
 use crate::dataset::pictures::statistics::Histogram;
-use crate::video::{H264Decoder, Rgb, VideoError, decode_png};
+use crate::video::{H264Decoder, Rgb, VideoError, decode_picture, decode_png};
 
 /// What is known of pictures of one size.
 #[derive(Debug, Default)]
@@ -21,6 +21,20 @@ impl PictureMeasure {
     /// Adds a picture in PNG.
     pub(in crate::dataset) fn add_png(&mut self, png: &[u8]) -> Result<(), VideoError> {
         self.decoded = decode_png(png)?;
+        self.add_decoded()
+    }
+
+    /// Adds a picture in PNG or JPEG, of whatever colours.
+    pub(in crate::dataset) fn add_encoded(&mut self, bytes: &[u8]) -> Result<(), VideoError> {
+        self.decoded = decode_picture(bytes)?;
+        self.add_decoded()
+    }
+
+    /// Adds a picture as it is: red, green, blue of each pixel.
+    pub(in crate::dataset) fn add_rgb(&mut self, size_px: [u32; 2], bytes: &[u8]) -> Result<(), VideoError> {
+        self.decoded.size_px = size_px;
+        self.decoded.bytes.clear();
+        self.decoded.bytes.extend_from_slice(bytes);
         self.add_decoded()
     }
 

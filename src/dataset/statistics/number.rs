@@ -80,6 +80,14 @@ pub(super) fn copy_keys(column: Values<'_>, rows: Range<usize>, bytes: &mut Vec<
             copy_chunks(all, |&value| key_of_f32(value).to_le_bytes(), bytes);
         }
         Values::Float64(all) => copy_chunks(&all[rows], |&value| key_of_f64(value).to_le_bytes(), bytes),
+        Values::Float64Vector(all, width) => {
+            let all = &all[rows.start * width..rows.end * width];
+            copy_chunks(all, |&value| key_of_f64(value).to_le_bytes(), bytes);
+        }
+        Values::Int64Vector(all, width) => {
+            let all = &all[rows.start * width..rows.end * width];
+            copy_chunks(all, |&value| key_of_i64(value).to_le_bytes(), bytes);
+        }
         Values::Int64(all) => copy_chunks(&all[rows], |&value| key_of_i64(value).to_le_bytes(), bytes),
         Values::Boolean(all) => copy_chunks(&all[rows], |&value| [u8::from(value)], bytes),
         _ => bytes.clear(),
