@@ -71,6 +71,8 @@ pub enum Command {
     Submit(SubmitArgs),
     /// Say how far a submitted run is; exit code 3 while something is left.
     Status(StatusArgs),
+    /// Turn recordings of robots, MCAP of any writer, into a LeRobotDataset.
+    Ingest(IngestArgs),
     /// Say what a file or folder is, and how much is in it.
     Inspect(PathArgs),
     /// Check a file or folder: its checksums, and all that a reader relies on.
@@ -277,6 +279,29 @@ pub struct TasksArgs {
     /// Do again what is up to date.
     #[arg(long, conflicts_with = "import")]
     pub force: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `ntp ingest`.
+#[derive(Debug, Args)]
+pub struct IngestArgs {
+    /// The recordings (.mcap), in the order of their episodes.
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Which topics and fields become which features.
+    #[arg(long, value_name = "MAP.toml", conflicts_with = "propose")]
+    pub map: Option<PathBuf>,
+    /// The dataset, a new folder.
+    #[arg(long, value_name = "DIR", conflicts_with = "propose")]
+    pub to: Option<PathBuf>,
+    /// Only print a map for what is in the first file.
+    #[arg(long)]
+    pub propose: bool,
+    /// Threads [default: one a core]; never changes a byte.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

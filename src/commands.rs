@@ -5,6 +5,7 @@ mod cluster;
 mod completions;
 mod dataset;
 mod explain;
+mod ingest;
 mod inspect;
 mod items;
 mod kind;
@@ -84,6 +85,7 @@ fn stops_in_order(command: &Command) -> bool {
         Command::Items(_)
         | Command::Submit(_)
         | Command::Status(_)
+        | Command::Ingest(_)
         | Command::Inspect(_)
         | Command::Validate(_)
         | Command::Replay(_)
@@ -126,6 +128,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Items(args) => items::run(args),
         Command::Submit(args) => cluster::submit(args),
         Command::Status(args) => cluster::status(args),
+        Command::Ingest(args) => ingest::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),

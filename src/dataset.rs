@@ -41,6 +41,7 @@ pub use config::{ConvertConfig, FailedEpisodes, FrameChoice};
 pub use files::error::{ConvertError, DatasetError};
 pub use files::finding::{Finding, Severity, Validation};
 pub use pictures::{EpisodePictures, EpisodeRows, PictureLoader, Wanted};
+pub use plain::PlainError;
 pub use read::lookup::{EpisodeFacts, FrameFacts, look_up};
 pub use read::playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
 pub use read::summary::{DatasetSummary, summarize};

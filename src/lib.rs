@@ -18,6 +18,7 @@ pub mod table;
 pub mod cluster;
 pub mod dataset;
 pub mod expert;
+pub mod ingest;
 pub mod lineage;
 pub mod model;
 pub mod pipeline;

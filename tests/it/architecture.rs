@@ -22,6 +22,7 @@ const ORDER: &[&str] = &[
     "expert",
     "recording",
     "dataset",
+    "ingest",
     "model",
     "training",
     "rollout",
@@ -36,10 +37,12 @@ const ORDER: &[&str] = &[
 ];
 
 /// Crates that only these modules may use.
-const OWNERS: [(&str, &[&str]); 9] = [
+const OWNERS: [(&str, &[&str]); 11] = [
     ("rapier3d", &["sim"]),
     ("burn", &["model", "training", "rollout/learned"]),
     ("mcap", &["recording"]),
+    ("re_ros_msg", &["ingest"]),
+    ("prost_reflect", &["ingest"]),
     ("rerun", &["visualize"]),
     ("polars", &["report", "query"]),
     ("arrow", &["table", "dataset"]),
@@ -112,6 +115,7 @@ const DATASET_ORDER: &[&str] = &[
     "schema",
     "statistics",
     "pictures",
+    "plain",
     "write",
     "read",
     "validate",

@@ -34,6 +34,7 @@ mod forward;
 mod fuzz;
 #[cfg(test)]
 mod import;
+mod ingest;
 #[cfg(test)]
 mod kill;
 #[cfg(test)]
