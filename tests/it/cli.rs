@@ -26,14 +26,6 @@ fn a_stage_that_does_not_exist_is_refused_with_those_that_do() {
 }
 
 #[test]
-fn a_first_stage_behind_the_last_is_refused() {
-    let output = ntp().args(["run", "pipelines/smoke.toml", "--from", "report", "--to", "tasks"]).output().unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert!(text.contains("--from report comes behind --to tasks; the stages are tasks, generate"), "{text}");
-}
-
-#[test]
 fn a_folder_is_made_behind_a_link_and_in_place_of_the_current_one_but_not_within_what_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
