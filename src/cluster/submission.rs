@@ -78,7 +78,7 @@ pub enum ClusterError {
     Io(#[from] IoError),
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
-    Pipeline(#[from] PipelineError),
+    Pipeline(Box<PipelineError>),
     /// Another pipeline or program was handed over before.
     #[error("{} was made with another {what}; --force hands over this one, where no task of the other is left", path.display())]
     Other {
@@ -96,6 +96,12 @@ pub enum ClusterError {
     /// The script cannot be written.
     #[error("the template of a script: {0}")]
     Template(#[from] minijinja::Error),
+}
+
+impl From<PipelineError> for ClusterError {
+    fn from(error: PipelineError) -> Self {
+        Self::Pipeline(Box::new(error))
+    }
 }
 
 impl ClusterError {

@@ -59,7 +59,7 @@ fn raw(value: &Value, encoding: &str, data: &[u8]) -> Result<Shown, Reason> {
     };
     let row_bytes = width as usize * n_channels;
     let step = number("step").filter(|&step| step > 0).map_or(row_bytes, |step| step as usize);
-    let n_bytes = step.checked_mul(height as usize).unwrap_or(usize::MAX);
+    let n_bytes = step.saturating_mul(height as usize);
     if row_bytes == 0 || step < row_bytes || data.len() < n_bytes {
         return Err(format!("{} bytes for {width}x{height} pixels of {encoding}", data.len()));
     }

@@ -76,6 +76,9 @@ pub struct LearnedPolicy<N: Network> {
     tasks: Vec<String>,
 }
 
+/// A decision, the running call after it, and the call that it makes.
+type Decided<R> = (Decision, [Running<R>; 2]);
+
 /// A call on an episode's stack.
 struct Running<R> {
     called_with: CalledWith,
@@ -171,11 +174,7 @@ impl<N: Network> LearnedPolicy<N> {
     }
 
     /// The decision, the running call after it, and what its callee is called with.
-    fn decide_one(
-        &self,
-        query: &Query,
-        running: Running<N::Recall>,
-    ) -> Result<(Decision, [Running<N::Recall>; 2]), ReadError> {
+    fn decide_one(&self, query: &Query, running: Running<N::Recall>) -> Result<Decided<N::Recall>, ReadError> {
         let Running { called_with, recall } = running;
         let known = &self.demonstrations[&key(&query.specification)];
         let window = N::window(&known.demonstration, query.window);

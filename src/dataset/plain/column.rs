@@ -33,7 +33,7 @@ enum Held {
     Int64(Vec<i64>),
     Bool(Vec<bool>),
     Text(Vec<String>),
-    Images(Vec<Picture>, PictureSample),
+    Images(Vec<Picture>, Box<PictureSample>),
     Video(Box<VideoTrack>),
 }
 
@@ -45,7 +45,7 @@ impl PlainColumn {
             PlainKind::Numbers(Dtype::Bool, _) => Held::Bool(Vec::new()),
             PlainKind::Numbers(..) => Held::Float32(Vec::new()),
             PlainKind::Text => Held::Text(Vec::new()),
-            PlainKind::Image(size_px) => Held::Images(Vec::new(), PictureSample::new(*size_px)),
+            PlainKind::Image(size_px) => Held::Images(Vec::new(), Box::new(PictureSample::new(*size_px))),
             PlainKind::Video(size_px) => {
                 Held::Video(Box::new(VideoTrack::new(root, &feature.name, *size_px, fps, file_bytes)))
             }

@@ -56,7 +56,7 @@ impl PictureSample {
         if found != expected {
             return Err(VideoError::Size { found, expected });
         }
-        let is_sampled = self.n_seen % SAMPLED == 0;
+        let is_sampled = self.n_seen.is_multiple_of(SAMPLED);
         self.n_seen += 1;
         match picture {
             Picture::Encoded(bytes) if is_sampled => self.measure.add_encoded(bytes),
