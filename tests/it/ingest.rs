@@ -38,6 +38,7 @@ impl Case {
         self.folder.path().join(name)
     }
 
+    #[expect(clippy::result_large_err, reason = "tests look at the error")]
     fn ingest(&self, map: &str) -> Result<IngestSummary, IngestError> {
         let path = self.path("map.toml");
         std::fs::write(&path, map).unwrap();

@@ -17,6 +17,9 @@ use serde_json::{Value, json};
 
 use crate::dataset::{convert_all, episodes};
 
+/// A column of so many rows.
+type Column = fn(usize) -> ArrayRef;
+
 /// A dataset in a folder, with its tables.
 fn small_dataset() -> (tempfile::TempDir, Tables) {
     let folder = tempfile::tempdir().unwrap();
@@ -254,7 +257,7 @@ fn a_column_of_a_type_that_is_not_read_is_named_and_other_tables_are_answered() 
     let path = folder.path().join("data/chunk-000/file-000.parquet");
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap().build().unwrap();
     let batches: Vec<RecordBatch> = reader.map(Result::unwrap).collect();
-    let with = |name: &str, column: fn(usize) -> ArrayRef| {
+    let with = |name: &str, column: Column| {
         let widened = |batch: &RecordBatch| {
             let added = (name.to_owned(), column(batch.num_rows()));
             let own = batch.schema().fields().iter().map(|field| field.name().clone()).collect::<Vec<_>>();
@@ -269,7 +272,7 @@ fn a_column_of_a_type_that_is_not_read_is_named_and_other_tables_are_answered() 
         tables
     };
     let n_frames = batches.iter().map(RecordBatch::num_rows).sum::<usize>();
-    let unread: [(&str, fn(usize) -> ArrayRef); 3] = [
+    let unread: [(&str, Column); 3] = [
         ("float16", |n| arrow::compute::cast(&Float32Array::from(vec![1.0; n]), &DataType::Float16).unwrap()),
         ("uint8", |n| Arc::new(UInt8Array::from(vec![1; n]))),
         ("uint16", |n| Arc::new(UInt16Array::from(vec![1; n]))),
@@ -283,7 +286,7 @@ fn a_column_of_a_type_that_is_not_read_is_named_and_other_tables_are_answered() 
         assert!(described.contains(&json!({ "column": "extra", "type": kind })), "{described:?}");
         assert_eq!(tables.describe().unwrap().len(), 6);
     }
-    let read: [fn(usize) -> ArrayRef; 4] = [
+    let read: [Column; 4] = [
         |n| Arc::new(Int8Array::from(vec![1; n])),
         |n| Arc::new(Int16Array::from(vec![1; n])),
         |n| Arc::new(Int32Array::from(vec![1; n])),

@@ -83,6 +83,7 @@ fn a_model_s_configuration_is_of_its_variant_whatever_has_a_name() {
 fn a_pipeline_file_names_a_variant_or_its_parts() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("parts.toml");
+    #[expect(clippy::result_large_err, reason = "tests look at the error")]
     let load = |variant: &str| {
         let text = format!(
             "name = \"parts\"\n[tasks]\nfamily = \"block_stacking\"\ntrain = 3\n[[models]]\nvariant = {variant}\n"
