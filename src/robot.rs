@@ -63,7 +63,8 @@ pub trait RobotApi {
     ///
     /// # Errors
     ///
-    /// What went wrong in this action. The world goes on: a reactive policy may still recover.
+    /// What went wrong in this action. The world goes on: a reactive policy may still recover. With
+    /// [`Cause::RobotLost`] it does not, and the action may end without a frame.
     fn act(&mut self, action: Action) -> Result<(), Cause>;
 
     /// The pushes from outside so far, in order; `None` in a world without an adversary.
@@ -72,11 +73,19 @@ pub trait RobotApi {
     }
 
     /// Lets the world come to rest without recording, to judge the outcome: the state at rest.
-    fn settle(&mut self) -> SceneState;
+    ///
+    /// # Errors
+    ///
+    /// [`Cause::RobotLost`] where the world can no longer be reached.
+    fn settle(&mut self) -> Result<SceneState, Cause>;
 
     /// Lifts a tray with all that is on it and carries it without recording, to judge the outcome: the state at rest
     /// where it was carried to.
-    fn carry(&mut self, tray: BodyIndex) -> SceneState;
+    ///
+    /// # Errors
+    ///
+    /// As [`RobotApi::settle`].
+    fn carry(&mut self, tray: BodyIndex) -> Result<SceneState, Cause>;
 
     /// The last boundary frame: what a program sees.
     fn now(&self) -> &Frame {

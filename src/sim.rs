@@ -230,13 +230,13 @@ impl RobotApi for Simulation {
         self.adversary.as_ref().map(|adversary| adversary.pushes.as_slice())
     }
 
-    fn settle(&mut self) -> SceneState {
+    fn settle(&mut self) -> Result<SceneState, Cause> {
         self.come_to_rest();
-        self.state()
+        Ok(self.state())
     }
 
-    fn carry(&mut self, tray: BodyIndex) -> SceneState {
+    fn carry(&mut self, tray: BodyIndex) -> Result<SceneState, Cause> {
         self.carry_away(tray);
-        self.state()
+        Ok(self.state())
     }
 }

@@ -14,19 +14,20 @@ pub struct Judgement {
     /// How many of them hold.
     pub met: u32,
     /// Why the task is not done, if it is not: [`Cause::EndedEarly`] when a goal does not hold at rest,
-    /// [`Cause::FellWhenCarried`] when it no longer does after the carrying.
+    /// [`Cause::FellWhenCarried`] when it no longer does after the carrying, [`Cause::RobotLost`] when the world can no
+    /// longer be reached; goals are those that held when it was seen last then.
     pub cause: Option<Cause>,
 }
 
 /// Lets the world come to rest and judges it; where all goals hold and the family has a tray, carries it and judges
 /// again.
 pub fn judge(task: &Task, world: &mut dyn RobotApi) -> Judgement {
-    let at_rest = world.settle();
-    let at_rest = judged(task, world, &at_rest, Cause::EndedEarly);
+    let settled = world.settle();
+    let at_rest = judged(task, world, settled, Cause::EndedEarly);
     let Some(tray) = task.family.tray().filter(|_| at_rest.cause.is_none()) else { return at_rest };
     for body in world.scene().slot(tray).bodies.clone() {
         let carried = world.carry(body);
-        let carried = judged(task, world, &carried, Cause::FellWhenCarried);
+        let carried = judged(task, world, carried, Cause::FellWhenCarried);
         if carried.cause.is_some() {
             return carried;
         }
@@ -34,10 +35,14 @@ pub fn judge(task: &Task, world: &mut dyn RobotApi) -> Judgement {
     at_rest
 }
 
-/// A state, with the cause where not all goals hold in it.
-fn judged(task: &Task, world: &dyn RobotApi, state: &SceneState, cause: Cause) -> Judgement {
-    let holds = |condition| condition_holds(world.scene(), state, condition);
+/// A state, with the cause where not all goals hold in it; where there is none, what was seen last with the cause of that.
+fn judged(task: &Task, world: &dyn RobotApi, state: Result<SceneState, Cause>, cause: Cause) -> Judgement {
+    let (state, lost) = match state {
+        Ok(state) => (state, None),
+        Err(lost) => (world.state(), Some(lost)),
+    };
+    let holds = |condition| condition_holds(world.scene(), &state, condition);
     let goals = task.conditions.len() as u32;
     let met = task.conditions.iter().filter(|condition| holds(condition)).count() as u32;
-    Judgement { goals, met, cause: (met < goals).then_some(cause) }
+    Judgement { goals, met, cause: lost.or((met < goals).then_some(cause)) }
 }

@@ -143,7 +143,8 @@ struct Running<'t> {
     first_divergence: Option<Divergence>,
     /// What first went wrong in physics, at which decision.
     first_fault: Option<(u32, Cause)>,
-    gave_up: bool,
+    /// Why it was given up before its end.
+    given_up: Option<Cause>,
     /// The decision that no call can be made of, if there was one.
     unlawful: Option<TraceError>,
 }
@@ -174,14 +175,14 @@ impl<'t> Running<'t> {
             decisions: 0,
             first_divergence: None,
             first_fault: None,
-            gave_up: false,
+            given_up: None,
             unlawful: None,
         }
     }
 
     /// What to ask the policy now; nothing when the episode is over.
     fn query(&self, episode: usize) -> Option<Query> {
-        let top = self.calls.top().filter(|_| !self.gave_up && self.unlawful.is_none())?;
+        let top = self.calls.top().filter(|_| self.given_up.is_none() && self.unlawful.is_none())?;
         Some(Query {
             episode,
             decision: self.decisions,
@@ -214,6 +215,7 @@ impl<'t> Running<'t> {
             && let Err(cause) = self.world.act(action)
         {
             self.first_fault.get_or_insert((number, cause));
+            self.given_up = (cause == Cause::RobotLost).then_some(cause);
         }
         if program.is_primitive() {
             self.seen = Arc::new(seen(&mut self.eye, self.world.as_ref()));
@@ -222,7 +224,9 @@ impl<'t> Running<'t> {
             self.calls.returned(self.frame());
         }
         let too_deep = self.calls.top().is_some_and(|top| top.depth >= self.limits.max_depth);
-        self.gave_up = self.calls.top().is_some() && (self.decisions >= self.max_decisions() || too_deep);
+        if self.calls.top().is_some() && (self.decisions >= self.max_decisions() || too_deep) {
+            self.given_up.get_or_insert(Cause::NeverEnded);
+        }
     }
 
     /// Compares the call just made with the expert's, until one differs.
@@ -251,8 +255,10 @@ impl<'t> Running<'t> {
             return Err(unlawful);
         }
         let judgement = judge(self.task, self.world.as_mut());
-        let cause = if self.gave_up { Some(Cause::NeverEnded) } else { judgement.cause };
-        let first_cause = |cause| self.first_fault.map_or(cause, |(_, fault)| fault);
+        let lost = judgement.cause.filter(|&cause| cause == Cause::RobotLost);
+        let cause = lost.or(self.given_up).or(judgement.cause);
+        let fault = self.first_fault.filter(|_| cause != Some(Cause::RobotLost));
+        let first_cause = |cause| fault.map_or(cause, |(_, fault)| fault);
         let outcome = cause.map_or(Outcome::Success, |cause| Outcome::Failure(first_cause(cause)));
         let frame = self.frame();
         let calls = self.calls.finish(frame);

@@ -93,7 +93,15 @@ pub(super) fn gravest(first: Option<Cause>, second: Option<Cause>) -> Option<Cau
         Cause::KnockedTower => 2,
         Cause::DroppedObject => 3,
         Cause::MissedGrasp => 4,
-        Cause::UnknownSlot | Cause::TimeLimit | Cause::EndedEarly | Cause::NeverEnded | Cause::FellWhenCarried => 5,
+        Cause::UnknownSlot
+        | Cause::TimeLimit
+        | Cause::EndedEarly
+        | Cause::NeverEnded
+        | Cause::FellWhenCarried
+        | Cause::NoPath
+        | Cause::Collided
+        | Cause::NotSeen
+        | Cause::RobotLost => 5,
     };
     first.into_iter().chain(second).min_by_key(gravity)
 }

@@ -37,11 +37,19 @@ pub enum Cause {
     NeverEnded,
     /// The goal held at rest, but not after the tray was carried away.
     FellWhenCarried,
+    /// The robot found no way to where it was to go.
+    NoPath,
+    /// The robot touched something on its way, or itself.
+    Collided,
+    /// The robot does not see what it was to handle.
+    NotSeen,
+    /// The robot did not answer, or not as the protocol asks.
+    RobotLost,
 }
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 14] = [
         Self::MissedGrasp,
         Self::KnockedTower,
         Self::ObjectOffTable,
@@ -52,6 +60,10 @@ impl Cause {
         Self::EndedEarly,
         Self::NeverEnded,
         Self::FellWhenCarried,
+        Self::NoPath,
+        Self::Collided,
+        Self::NotSeen,
+        Self::RobotLost,
     ];
 
     /// The name in files.
@@ -67,6 +79,10 @@ impl Cause {
             Self::EndedEarly => "ended_early",
             Self::NeverEnded => "never_ended",
             Self::FellWhenCarried => "fell_when_carried",
+            Self::NoPath => "no_path",
+            Self::Collided => "collided",
+            Self::NotSeen => "not_seen",
+            Self::RobotLost => "robot_lost",
         }
     }
 

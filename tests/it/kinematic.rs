@@ -118,12 +118,12 @@ impl RobotApi for KinematicWorld {
         acted
     }
 
-    fn settle(&mut self) -> SceneState {
-        self.state()
+    fn settle(&mut self) -> Result<SceneState, Cause> {
+        Ok(self.state())
     }
 
-    fn carry(&mut self, _tray: BodyIndex) -> SceneState {
-        self.state()
+    fn carry(&mut self, _tray: BodyIndex) -> Result<SceneState, Cause> {
+        Ok(self.state())
     }
 }
 

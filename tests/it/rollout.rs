@@ -68,14 +68,14 @@ impl RobotApi for Shaky {
     fn act(&mut self, action: Action) -> Result<(), Cause> {
         self.0.act(action)
     }
-    fn settle(&mut self) -> SceneState {
+    fn settle(&mut self) -> Result<SceneState, Cause> {
         self.0.settle()
     }
-    fn carry(&mut self, tray: BodyIndex) -> SceneState {
-        let mut carried = self.0.carry(tray);
+    fn carry(&mut self, tray: BodyIndex) -> Result<SceneState, Cause> {
+        let mut carried = self.0.carry(tray)?;
         let fork = self.scene().slot(SlotIndex(4)).bodies[0];
         carried.bodies_in_world[usize::from(fork.0)].translation.vector.x += 0.3;
-        carried
+        Ok(carried)
     }
 }
 

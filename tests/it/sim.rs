@@ -34,7 +34,7 @@ fn a_tower_of_eight_is_as_high_as_its_blocks() {
     for upper in 1..8 {
         act_all(&mut world, &pick_and_place(upper, upper - 1));
     }
-    let state = world.settle();
+    let state = world.settle().unwrap();
     for (level, pose) in state.bodies_in_world.iter().enumerate() {
         let error_m = pose.translation.vector.z - (0.025 + 0.05 * level as f32);
         assert!(error_m.abs() < 0.001, "block {level} is {error_m} m off its height");
@@ -79,7 +79,7 @@ fn only_what_is_between_the_fingers_is_grasped() {
     let mut world = Table::default().with("block", BLOCK, [0.0, 0.0]).gripper([0.0, 0.02, 0.3]).world();
     let before = world.state().bodies_in_world[0];
     assert_eq!(world.act(Action::Grip), Err(Cause::MissedGrasp));
-    let moved = world.settle().bodies_in_world[0].translation.vector - before.translation.vector;
+    let moved = world.settle().unwrap().bodies_in_world[0].translation.vector - before.translation.vector;
     assert!(moved.norm() < 1e-3, "the block is not pushed into the table");
     // At the block's end along the fingers' flat sides.
     let mut world = Table::default().with("block", BLOCK, [0.0, 0.0]).gripper([0.02, 0.0, 0.3]).world();
@@ -97,7 +97,8 @@ fn a_turned_block_is_gripped_at_its_sides_and_set_down_straight() {
         let mut world =
             Table::default().with("block", BLOCK, [0.0, 0.1]).turned(yaw_rad).with("base", BLOCK, [0.1, 0.0]).world();
         act_all(&mut world, &pick_and_place(0, 1));
-        let yaw = ntp::geometry::yaw_rad(&world.settle().bodies_in_world[0]).rem_euclid(std::f32::consts::FRAC_PI_2);
+        let yaw =
+            ntp::geometry::yaw_rad(&world.settle().unwrap().bodies_in_world[0]).rem_euclid(std::f32::consts::FRAC_PI_2);
         let off = yaw.min(std::f32::consts::FRAC_PI_2 - yaw);
         assert!(off < 0.02, "a block turned by {yaw_rad} rad is set down {off} rad off");
     }
@@ -118,7 +119,7 @@ fn a_carried_block_passes_above_a_tower_in_its_way() {
     let over: Vec<_> = world.frames().iter().filter(over).collect();
     assert!(!over.is_empty(), "the way leads over the tower");
     assert!(over.iter().all(|frame| frame.state.bodies_in_world[0].translation.vector.z - 0.025 > 0.2));
-    for (before, after) in tower.iter().zip(&world.settle().bodies_in_world[2..]) {
+    for (before, after) in tower.iter().zip(&world.settle().unwrap().bodies_in_world[2..]) {
         assert!((before.translation.vector - after.translation.vector).norm() < 1e-4);
     }
 }
@@ -151,7 +152,7 @@ fn what_falls_off_the_table_is_named() {
     assert_eq!(world.act(Action::Grip), Ok(()));
     assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
     assert_eq!(world.act(Action::Release), Err(Cause::ObjectOffTable));
-    let state = world.settle();
+    let state = world.settle().unwrap();
     assert!(state.bodies_in_world[0].translation.vector.z < -0.2, "it lies on the ground");
     assert_eq!(world.act(Action::MoveTo(SlotIndex(1))), Ok(()));
 }
