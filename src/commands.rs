@@ -1,6 +1,7 @@
 //! One file a command. Commands read the command line, call the library, and print: results to stdout, the rest to
 //! stderr.
 
+mod act;
 mod cluster;
 mod completions;
 mod dataset;
@@ -15,6 +16,7 @@ mod query;
 mod render;
 mod repair;
 mod replay;
+mod robot;
 mod stages;
 mod tasks;
 mod validate;
@@ -27,6 +29,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::artifact::remove_unfinished;
 use crate::cli::{Cli, Command};
 use crate::cluster::ClusterError;
+use crate::deploy::DeployError;
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
 
@@ -81,7 +84,8 @@ fn stops_in_order(command: &Command) -> bool {
         | Command::Train(_)
         | Command::Rollout(_)
         | Command::Report(_)
-        | Command::Publish(_) => true,
+        | Command::Publish(_)
+        | Command::Act(_) => true,
         Command::Items(_)
         | Command::Submit(_)
         | Command::Status(_)
@@ -95,6 +99,7 @@ fn stops_in_order(command: &Command) -> bool {
         | Command::Repair(_)
         | Command::Dataset(_)
         | Command::Verify(_)
+        | Command::Robot(_)
         | Command::Completions { .. } => false,
     }
 }
@@ -103,7 +108,9 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if error.downcast_ref::<UsageError>().is_some() {
         return 2;
     }
-    if matches!(error.downcast_ref(), Some(PublishError::Interrupted)) {
+    if matches!(error.downcast_ref(), Some(PublishError::Interrupted))
+        || matches!(error.downcast_ref(), Some(DeployError::Interrupted))
+    {
         return 130;
     }
     if error.downcast_ref::<ClusterError>().is_some_and(ClusterError::is_usage) {
@@ -139,6 +146,8 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Dataset(command) => dataset::run(command),
         Command::Publish(args) => publish::run(args, stop),
         Command::Verify(args) => verify::run(args),
+        Command::Act(args) => act::run(args, stop),
+        Command::Robot(args) => robot::run(args),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -17,6 +17,7 @@ pub mod table;
 
 pub mod cluster;
 pub mod dataset;
+pub mod deploy;
 pub mod expert;
 pub mod ingest;
 pub mod lineage;
@@ -25,6 +26,7 @@ pub mod pipeline;
 pub mod publish;
 pub mod query;
 pub mod recording;
+pub mod remote;
 pub mod render;
 pub mod report;
 pub mod robot;

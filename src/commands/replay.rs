@@ -22,7 +22,7 @@ use crate::visualize::{self, Replay};
 
 /// An episode, with what is to be shown beside it.
 pub(super) struct Found {
-    number: u64,
+    pub(super) number: u64,
     pub(super) file: PathBuf,
     plan: Plan,
     pub(super) episode: Episode,

@@ -4,7 +4,7 @@
 //! The suite does some thousand cases from a fixed seed. `NTP_FUZZ=1000000 cargo test --release fuzz` does a million
 //! in all, `NTP_SEED=n` others. What once failed stays in `fuzz.regressions` and comes first.
 
-mod change;
+pub(crate) mod change;
 mod values;
 
 use std::path::{Path, PathBuf};

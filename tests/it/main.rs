@@ -34,6 +34,7 @@ mod forward;
 mod fuzz;
 #[cfg(test)]
 mod import;
+#[cfg(test)]
 mod ingest;
 #[cfg(test)]
 mod kill;
@@ -65,6 +66,8 @@ mod publish;
 mod query;
 #[cfg(test)]
 mod recording;
+#[cfg(test)]
+mod remote;
 #[cfg(test)]
 mod render;
 #[cfg(test)]
