@@ -304,7 +304,8 @@ fn a_robot_that_dies_is_lost_and_recorded_up_to_there() {
     let whole = in_process(&trials, 0).episode;
     for n_lines in [3, 10, 25, 40] {
         let some = "while [ $n -gt 0 ] && read -r line; do echo \"$line\"; n=$((n - 1)); done";
-        let command = format!("{} robot --family block_stacking | {{ n={n_lines}; {some}; }}", binary());
+        // All of it is killed at once, so that no end of a pipe stays open.
+        let command = format!("{} robot --family block_stacking | {{ n={n_lines}; {some}; kill -9 0; }}", binary());
         let wire = connect(&Address::Command(command), Arc::default()).unwrap();
         let family = trials.task.family;
         let session = Session::begin(wire, "test", family, scene(family, &[]), PATIENCE).unwrap();
