@@ -12,6 +12,7 @@ mod items;
 mod kind;
 mod output;
 mod publish;
+#[cfg(feature = "query")]
 mod query;
 mod render;
 mod repair;
@@ -30,6 +31,9 @@ use crate::artifact::remove_unfinished;
 use crate::cli::{Cli, Command};
 use crate::cluster::ClusterError;
 use crate::deploy::DeployError;
+#[cfg(not(feature = "query"))]
+use crate::feature::Feature;
+use crate::feature::NotBuiltIn;
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
 
@@ -105,7 +109,7 @@ fn stops_in_order(command: &Command) -> bool {
 }
 
 fn exit_code(error: &anyhow::Error) -> u8 {
-    if error.downcast_ref::<UsageError>().is_some() {
+    if error.downcast_ref::<UsageError>().is_some() || error.downcast_ref::<NotBuiltIn>().is_some() {
         return 2;
     }
     if matches!(error.downcast_ref(), Some(PublishError::Interrupted))
@@ -140,7 +144,10 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Render(args) => render::run(args),
+        #[cfg(feature = "query")]
         Command::Query(args) => query::run(args),
+        #[cfg(not(feature = "query"))]
+        Command::Query(_) => Err(NotBuiltIn(Feature::Query).into()),
         Command::Explain(args) => explain::run(args),
         Command::Repair(args) => repair::run(args),
         Command::Dataset(command) => dataset::run(command),

@@ -8,6 +8,7 @@
 //! later one. ARCHITECTURE.md is the map.
 
 pub mod artifact;
+pub mod feature;
 pub mod geometry;
 pub mod program;
 pub mod progress;
@@ -24,10 +25,12 @@ pub mod lineage;
 pub mod model;
 pub mod pipeline;
 pub mod publish;
+#[cfg(feature = "query")]
 pub mod query;
 pub mod recording;
 pub mod remote;
 pub mod render;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod robot;
 pub mod rollout;
@@ -36,6 +39,7 @@ pub mod task;
 pub mod trace;
 pub mod training;
 pub mod video;
+#[cfg(feature = "viewer")]
 pub mod visualize;
 
 pub mod cli;

@@ -20,6 +20,7 @@ mod error;
 mod eye;
 mod facts;
 mod failures;
+#[cfg(feature = "report")]
 mod filmstrips;
 mod gallery;
 mod generate;

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use crate::artifact::{ContractError, IoError, LockError};
 use crate::dataset::{ConvertError, DatasetError};
+use crate::feature::NotBuiltIn;
 use crate::model::ModelError;
 use crate::recording::RecordingError;
+#[cfg(feature = "report")]
 use crate::report::ReportError;
 use crate::rollout::RolloutError;
 use crate::sim::SimError;
@@ -105,9 +107,13 @@ pub enum PipelineError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Table(#[from] TableError),
+    #[cfg(feature = "report")]
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Report(#[from] ReportError),
+    #[expect(missing_docs, reason = "wraps an error that documents itself")]
+    #[error(transparent)]
+    NotBuiltIn(#[from] NotBuiltIn),
     /// A model that sees cannot look at an episode.
     #[error("suite {suite}, episode {episode} (task {task_id}), camera {camera}: {source}")]
     Sight {
@@ -137,6 +143,10 @@ pub enum PipelineError {
 impl PipelineError {
     /// Whether the command or the pipeline file is at fault, and nothing was written.
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Syntax { .. } | Self::Value { .. } | Self::Contract(ContractError::OtherPlan { .. }))
+        match self {
+            Self::Syntax { .. } | Self::Value { .. } | Self::NotBuiltIn(_) => true,
+            Self::Contract(error) => matches!(error, ContractError::OtherPlan { .. }),
+            _ => false,
+        }
     }
 }

@@ -4,7 +4,8 @@
 use std::path::PathBuf;
 
 use crate::artifact::StageDir;
-use crate::pipeline::{PipelineError, demonstration_of, rollout};
+use crate::pipeline::rollout::{self, MOST_FAILURES};
+use crate::pipeline::{PipelineError, demonstration_of};
 use crate::recording::ShardReader;
 use crate::render::{CameraConfig, PictureQuality, Viewpoint};
 use crate::report::{Filmstrip, Shows, StripPicture};
@@ -17,8 +18,6 @@ use crate::video::{Film, Rgb, encode_jpeg};
 const N_PICTURES: usize = 6;
 /// Width and height: a sixth of the page on a screen of one and a half times its density.
 const SIZE_PX: [u32; 2] = [240, 180];
-/// Failures of a suite that are shown; so many of each shard are recorded, wherever they are.
-pub(super) const MOST_FAILURES: usize = 3;
 /// Failures of an experiment that are shown.
 const MOST_FAILURES_IN_ALL: usize = 12;
 

@@ -10,7 +10,6 @@ use crate::artifact::{FileEntry, Manifest, StageDir};
 use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
-use crate::pipeline::filmstrips::MOST_FAILURES;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
 use crate::pipeline::recorded::RolloutSettings;
 use crate::pipeline::train::{self, Model};
@@ -34,6 +33,8 @@ use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 const VERSION: u32 = 2;
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
+/// Failures of a suite that a report shows; so many of each shard are recorded, wherever they are.
+pub(super) const MOST_FAILURES: usize = 3;
 /// How the paths of a shard's tables begin.
 const PART: &str = "parts/part-";
 const DETECTIONS_PART: &str = "parts/detections-";

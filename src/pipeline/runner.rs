@@ -5,6 +5,7 @@ use std::path::Path;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::artifact::{ContractError, IoError, LockError, Plan, RunLock, remove_partials};
+use crate::feature::Feature;
 use crate::pipeline::costs::{Costs, Measured};
 use crate::pipeline::unit::{Context, Job, Made, Unit, Worker};
 use crate::pipeline::{
@@ -77,7 +78,11 @@ pub(super) fn units(pipeline: &Pipeline, stage: Stage) -> Vec<Box<dyn Unit + '_>
 
 /// Refuses what the chosen stages cannot be asked for.
 fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineError> {
-    let Options { from, to, ref scope, .. } = *options;
+    let Options { from, to, ref scope, dry_run, .. } = *options;
+    // Before hours of work, and not after them.
+    if to == Stage::Report && !dry_run {
+        Feature::Report.require()?;
+    }
     let problem = match scope {
         _ if from > to => Some(("--from", format!("is {from}, which comes after --to {to}"))),
         Scope::Whole => None,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::artifact::{ContractError, IoError};
 use crate::dataset::{DatasetError, Finding};
+use crate::feature::{Feature, NotBuiltIn};
 use crate::table::TableError;
 
 /// A dataset that is not published.
@@ -69,7 +70,7 @@ pub enum PublishError {
         path: PathBuf,
     },
     /// A bucket cannot be reached by this program.
-    #[error("{url}: this program was built without buckets; build it with: cargo build --release --features cloud")]
+    #[error("{url}: {}", NotBuiltIn(Feature::Cloud))]
     NoCloud {
         /// The bucket.
         url: String,
