@@ -9,6 +9,7 @@ use clap_complete::Shell;
 use crate::cluster::Engine;
 use crate::dataset::edit::Ending;
 use crate::dataset::export::LabelForm;
+use crate::model::ComputeDevice;
 use crate::pipeline::{ItemRanges, Stage};
 use crate::publish::{Date, License, Place, Release};
 use crate::remote::Address;
@@ -61,9 +62,9 @@ pub enum Command {
     /// Turn recordings into a dataset: a LeRobotDataset with program tables.
     Convert(StageArgs),
     /// Train models on the dataset.
-    Train(StageArgs),
+    Train(LearnArgs),
     /// Let the trained models act the tasks of each suite in physics.
-    Rollout(StageArgs),
+    Rollout(LearnArgs),
     /// Put the results together: an HTML page, JSON and CSV; prints Markdown.
     Report(StageArgs),
     /// List the items of a pipeline's stages: the work that processes can share.
@@ -133,6 +134,25 @@ pub struct StageArgs {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `ntp train`, `ntp rollout`.
+#[derive(Debug, Args)]
+pub struct LearnArgs {
+    /// What all stages take.
+    #[command(flatten)]
+    pub stage: StageArgs,
+    /// What networks are computed on.
+    #[command(flatten)]
+    pub device: DeviceArgs,
+}
+
+/// What networks are computed on. See docs/gpu.md.
+#[derive(Debug, Args)]
+pub struct DeviceArgs {
+    /// Compute networks on: cpu, wgpu or wgpu:N (a graphics card), cuda or cuda:N (one of NVIDIA's).
+    #[arg(long, value_name = "DEVICE", default_value = "cpu")]
+    pub device: ComputeDevice,
 }
 
 /// How much of one stage is done by this process; the whole when none is given. See docs/cluster.md.
@@ -255,6 +275,9 @@ pub struct RunArgs {
     /// What all stages take.
     #[command(flatten)]
     pub stage: StageArgs,
+    /// What networks are computed on.
+    #[command(flatten)]
+    pub device: DeviceArgs,
     /// First stage: tasks, generate, convert, train, rollout or report.
     #[arg(long, value_name = "STAGE", default_value = "tasks")]
     pub from: Stage,
@@ -486,6 +509,9 @@ pub struct ActArgs {
     /// How long each answer of the robot may take, in seconds.
     #[arg(long, value_name = "SECS", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=3600))]
     pub deadline: u32,
+    /// What the model is computed on.
+    #[command(flatten)]
+    pub device: DeviceArgs,
     /// Record what happens: a new folder with a recording (.mcap) and a table of the trials.
     #[arg(long, value_name = "DIR", conflicts_with = "dry_run")]
     pub record: Option<PathBuf>,

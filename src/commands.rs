@@ -34,6 +34,7 @@ use crate::deploy::DeployError;
 #[cfg(not(feature = "query"))]
 use crate::feature::Feature;
 use crate::feature::NotBuiltIn;
+use crate::model::ComputeDevice;
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
 
@@ -120,6 +121,9 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     if error.downcast_ref::<ClusterError>().is_some_and(ClusterError::is_usage) {
         return 2;
     }
+    if matches!(error.downcast_ref(), Some(DeployError::Device(error)) if error.is_usage()) {
+        return 2;
+    }
     match error.downcast_ref::<PipelineError>() {
         Some(PipelineError::Interrupted) => 130,
         Some(error) if error.is_usage() => 2,
@@ -129,12 +133,12 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 
 fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
     match command {
-        Command::Run(args) => stages::run(&args.stage, args.from, args.to, stop),
+        Command::Run(args) => stages::run(&args.stage, args.device.device, args.from, args.to, stop),
         Command::Tasks(args) => tasks::run(args, stop),
-        Command::Generate(args) => stages::run(args, Stage::Generate, Stage::Generate, stop),
-        Command::Convert(args) => stages::run(args, Stage::Convert, Stage::Convert, stop),
-        Command::Train(args) => stages::run(args, Stage::Train, Stage::Train, stop),
-        Command::Rollout(args) => stages::run(args, Stage::Rollout, Stage::Rollout, stop),
+        Command::Generate(args) => stages::run(args, ComputeDevice::Cpu, Stage::Generate, Stage::Generate, stop),
+        Command::Convert(args) => stages::run(args, ComputeDevice::Cpu, Stage::Convert, Stage::Convert, stop),
+        Command::Train(args) => stages::run(&args.stage, args.device.device, Stage::Train, Stage::Train, stop),
+        Command::Rollout(args) => stages::run(&args.stage, args.device.device, Stage::Rollout, Stage::Rollout, stop),
         Command::Report(args) => stages::report(args, stop),
         Command::Items(args) => items::run(args),
         Command::Submit(args) => cluster::submit(args),

@@ -47,7 +47,8 @@ pub use read::playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play
 pub use read::summary::{DatasetSummary, summarize};
 pub use read::table_files::table_files;
 pub use read::trial_data::{DatasetTrials, TrialData};
-pub use read::trials::read_trials;
+pub use read::trial_spool::TrialSpool;
+pub use read::trials::{LearnedTrials, read_learned_trials, read_trials};
 pub use tables::calls::facts::CallFacts;
 pub use validate::validate;
 pub use write::convert::{RecordedEpisode, RecordingEpisodes, convert};

@@ -20,11 +20,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::artifact::{ContractError, IoError, StagingError};
-use crate::model::{self, Decoder, ModelConfig, ModelError};
+use crate::model::{self, ComputeDevice, Decoder, DeviceError, ModelConfig, ModelError};
 use crate::recording::RecordingError;
 use crate::remote::{Echo, InProcess, RemoteError, RemoteRobot, Session, SimulatedRobot};
 use crate::robot::RobotApi as _;
-use crate::rollout::{Limits, Oracle, Policy, RolloutEpisode, RolloutError, Start, load_policy, run};
+use crate::rollout::{Limits, Oracle, Policy, RolloutEpisode, RolloutError, Start, load_policy_on, run};
 use crate::seed::Seed;
 use crate::sim::SimulationConfig;
 use crate::table::TableError;
@@ -39,6 +39,8 @@ pub enum DeployError {
     Remote(#[from] RemoteError),
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(transparent)]
@@ -82,7 +84,7 @@ impl Driver {
     /// # Errors
     ///
     /// When it cannot be loaded, is for another family or number of slots, or looks at pictures.
-    pub fn load(folder: &Path, demonstration: &Episode) -> Result<Self, DeployError> {
+    pub fn load(folder: &Path, device: ComputeDevice, demonstration: &Episode) -> Result<Self, DeployError> {
         let config = model::load_config(folder)?;
         let path = folder.to_owned();
         let (found, expected) = (config.family, demonstration.provenance.family);
@@ -96,7 +98,7 @@ impl Driver {
         if found != expected {
             return Err(DeployError::Slots { path, found, expected });
         }
-        let (config, policy) = load_policy(folder, Decoder::default())?;
+        let (config, policy) = load_policy_on(&device.open()?, folder, Decoder::default())?;
         Ok(Self::Model { config: Box::new(config), policy })
     }
 

@@ -17,11 +17,15 @@ pub enum Feature {
     Viewer,
     /// Buckets.
     Cloud,
+    /// Graphics cards behind Vulkan, Metal or DirectX.
+    Wgpu,
+    /// Cards of NVIDIA's.
+    Cuda,
 }
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Report, Self::Query, Self::Viewer, Self::Cloud];
+    pub const ALL: [Self; 6] = [Self::Report, Self::Query, Self::Viewer, Self::Cloud, Self::Wgpu, Self::Cuda];
 
     /// Its name in `Cargo.toml`.
     pub fn name(self) -> &'static str {
@@ -30,6 +34,8 @@ impl Feature {
             Self::Query => "query",
             Self::Viewer => "viewer",
             Self::Cloud => "cloud",
+            Self::Wgpu => "wgpu",
+            Self::Cuda => "cuda",
         }
     }
 
@@ -40,6 +46,8 @@ impl Feature {
             Self::Query => cfg!(feature = "query"),
             Self::Viewer => cfg!(feature = "viewer"),
             Self::Cloud => cfg!(feature = "cloud"),
+            Self::Wgpu => cfg!(feature = "wgpu"),
+            Self::Cuda => cfg!(feature = "cuda"),
         }
     }
 
@@ -59,6 +67,8 @@ impl Feature {
             Self::Query => "SQL",
             Self::Viewer => "the Rerun viewer",
             Self::Cloud => "buckets",
+            Self::Wgpu => "wgpu",
+            Self::Cuda => "CUDA",
         }
     }
 }

@@ -25,6 +25,7 @@ mod core_network;
 mod decoder;
 mod detecting;
 mod detector;
+mod device;
 mod encoder;
 mod encoder_kind;
 mod features;
@@ -42,6 +43,7 @@ mod perception;
 mod pictures;
 mod programmer;
 mod read_error;
+mod running_programs;
 mod scoping;
 mod scoping_kind;
 mod sighted;
@@ -64,7 +66,9 @@ pub use detector::{
     DetectionLoss, Detector, DetectorDefaults, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig,
     detector_of,
 };
-pub(crate) use detector::{loss as detection_loss, positions_in_world};
+pub(crate) use detector::{loss as detection_loss, loss_and_distance, positions_in_world};
+pub(crate) use device::is_processor;
+pub use device::{ComputeDevice, DeviceError, NoDevice};
 pub use encoder::{ArgumentDecoder, Encoder, TrainingDefaults, Widths};
 pub use encoder_kind::EncoderKind;
 pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened};
@@ -80,6 +84,7 @@ pub use perception::{Looks, Perception};
 pub use pictures::{PictureIndex, PictureSample, Pictures};
 pub use programmer::{Ntp, NtpGru, Programmer};
 pub use read_error::ReadError;
+pub use running_programs::RunningPrograms;
 pub use scoping::ScopeHead;
 pub use scoping_kind::{MAX_ARGUMENTS, ScopingKind};
 pub use sighted::{Naming, PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};

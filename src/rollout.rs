@@ -22,7 +22,7 @@ pub use divergence::{Divergence, DivergenceKind, expected_calls};
 pub use expectation::Expectation;
 pub use facts::{ModelFacts, SuiteFacts};
 pub use interpreter::{Eye, Limits, RolloutEpisode, RolloutError, Sight, Start, run};
-pub use learned::{LearnedPolicy, load_policy};
+pub use learned::{LearnedPolicy, load_policy, load_policy_on};
 pub use oracle::Oracle;
 pub use policy::{Decision, Policy, PolicyError, Query, Specification};
 pub use rows::{Acted, RolloutRows, SCHEMA as ROLLOUTS};

@@ -14,6 +14,7 @@
 //!
 //! Paper, section IV, "Model Training".
 
+mod adam;
 mod augment;
 mod batch;
 mod call_tree;
@@ -26,10 +27,13 @@ mod detector_metrics;
 mod error;
 mod examples;
 mod learner;
+mod lesson;
+mod merged;
 mod metrics;
 mod recovery;
 mod run;
 mod seen;
+mod source;
 mod sub_task;
 
 pub use batch::{Group, Part, draw};
@@ -40,23 +44,24 @@ pub use error::TrainError;
 pub use examples::{Example, Examples, Grain};
 pub use learner::{Learner, Losses, Stepped, losses};
 pub use metrics::{Metric, SCHEMA as METRICS};
-pub use seen::Gallery;
+pub use seen::{Galleries, Gallery};
+pub use source::{Source, TrialStream};
 
 use std::path::Path;
 
 use burn::module::ModuleDisplay;
-use burn::tensor::Device;
 
 use crate::artifact::{self, IoError};
 use crate::dataset::DatasetTrials;
 use crate::model::{
-    CONFIG_FILE, Detecting, Detector, EncoderKind, ModelConfig, Network, NetworkUse, ScopingKind, Variant,
-    VggDetectorConfig, WEIGHTS_FILE, weights_to_bytes, with_network,
+    CONFIG_FILE, ComputeDevice, Detecting, Detector, EncoderKind, ModelConfig, Network, NetworkUse, ScopingKind,
+    Variant, VggDetectorConfig, WEIGHTS_FILE, weights_to_bytes, with_network,
 };
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
 use crate::training::detector::DetectorRun;
 use crate::training::run::Run;
+use crate::training::source::{Facts, facts_of};
 
 /// Name of the learning curves in a model's folder.
 pub const METRICS_FILE: &str = "metrics.parquet";
@@ -124,8 +129,24 @@ pub fn train_on_pictures(
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
+    train_from(ComputeDevice::Cpu, training, Source::Here(data, gallery), folder, hooks)
+}
+
+/// The same on a device, also from trials on disk. A model that was trained elsewhere than on the processor says so.
+///
+/// # Errors
+///
+/// As [`train_on_pictures`]; [`TrainError::Device`] when the device cannot be used; and for a detector of trials on disk.
+pub fn train_from(
+    on: ComputeDevice,
+    training: &Training,
+    source: Source<'_>,
+    folder: &Path,
+    hooks: &mut Hooks<'_>,
+) -> Result<TrainSummary, TrainError> {
     training.check()?;
-    if training.variant.sees() && gallery.is_none() {
+    let size = source.picture_size();
+    if training.variant.sees() && size.is_none() {
         let found = training.variant.to_string();
         return Err(TrainError::Config {
             key: "variant",
@@ -133,45 +154,58 @@ pub fn train_on_pictures(
             allowed: "variants that see only with a dataset of pictures",
         });
     }
-    check_pictures(training.variant, gallery)?;
+    check_pictures(training.variant, size)?;
     let training = training.resolved();
-    let family = family(data)?;
-    let written =
-        serde_json::to_value(&training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let mut model = ModelConfig::new(training.variant, training.specification, family, data.n_slots, written);
-    if training.variant.scoping() == ScopingKind::Arguments {
-        model.tasks = Examples::new(data)?.task_ids();
-    }
-    let device = Device::flex().autodiff();
+    let facts = source.facts()?;
+    let model = model(&training, &facts, size, folder)?;
+    let device = on.open()?.autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
-    if let Some((width, height)) = gallery.map(Gallery::size) {
+    let learning = Learning { on, config: &training.config, source, facts: &facts, model: &model, folder, seed, hooks };
+    with_network(&model, seed, &device, learning)?
+}
+
+/// The configuration that settings and trials ask for.
+fn model(
+    training: &Training,
+    facts: &Facts,
+    picture_size: Option<(usize, usize)>,
+    folder: &Path,
+) -> Result<ModelConfig, TrainError> {
+    let Training { variant, config, .. } = training;
+    let n_slots = facts.n_slots;
+    let written =
+        serde_json::to_value(training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
+    let mut model = ModelConfig::new(*variant, training.specification, facts.family, n_slots, written);
+    if variant.scoping() == ScopingKind::Arguments {
+        model.tasks.clone_from(&facts.task_ids);
+    }
+    if let Some((width, height)) = picture_size {
         if width != height {
             let (key, found) = ("size of the pictures", format!("{width}x{height} pixels"));
             return Err(TrainError::Config { key, found, allowed: "as wide as high" });
         }
-        model.network = model.network.for_pictures(width, data.n_slots);
-        if let Some(colours) = training.config.colours {
-            check_colours(training.variant, colours, data.n_slots)?;
+        model.network = model.network.for_pictures(width, n_slots);
+        if let Some(colours) = config.colours {
+            check_colours(*variant, colours, n_slots)?;
             model.network = model.network.telling_apart(colours as usize);
         }
-        if let Some(narrowed) = training.config.detector.narrowed {
+        if let Some(narrowed) = config.detector.narrowed {
             model.network = model.network.narrowed(narrowed as usize);
         }
     }
-    if let Some(kernel) = training.config.scope_kernel {
-        check_kernel(kernel, data)?;
+    if let Some(kernel) = config.scope_kernel {
+        check_kernel(kernel, facts.longest)?;
         model.network = model.network.with_scope_kernel(kernel as usize);
     }
-    if training.config.relations {
+    if config.relations {
         model.network = model.network.with_relations();
     }
-    let learning = Learning { config: &training.config, data, gallery, model: &model, folder, seed, hooks };
-    with_network(&model, seed, &device, learning)?
+    Ok(model)
 }
 
 /// Refuses pictures that are too small for a network.
-fn check_pictures(variant: Variant, gallery: Option<&dyn Gallery>) -> Result<(), TrainError> {
-    let Some((width, height)) = gallery.map(Gallery::size) else { return Ok(()) };
+fn check_pictures(variant: Variant, size: Option<(usize, usize)>) -> Result<(), TrainError> {
+    let Some((width, height)) = size else { return Ok(()) };
     if variant.encoder() == EncoderKind::DetectedFlattened && width.min(height) < VggDetectorConfig::LEAST_PIXELS {
         return Err(TrainError::Config {
             key: "variant",
@@ -183,8 +217,7 @@ fn check_pictures(variant: Variant, gallery: Option<&dyn Gallery>) -> Result<(),
 }
 
 /// A kernel longer than every demonstration sees nothing more.
-fn check_kernel(kernel: u32, data: &DatasetTrials) -> Result<(), TrainError> {
-    let longest = data.trials.iter().map(|trial| trial.n_frames).max().unwrap_or(0);
+fn check_kernel(kernel: u32, longest: usize) -> Result<(), TrainError> {
     if kernel as usize > longest {
         return Err(TrainError::Config {
             key: "scope_kernel",
@@ -209,9 +242,10 @@ fn check_colours(variant: Variant, colours: u32, n_slots: usize) -> Result<(), T
 
 /// A training that waits for its network.
 struct Learning<'r, 'h> {
+    on: ComputeDevice,
     config: &'r TrainConfig,
-    data: &'r DatasetTrials,
-    gallery: Option<&'r dyn Gallery>,
+    source: Source<'r>,
+    facts: &'r Facts,
     model: &'r ModelConfig,
     folder: &'r Path,
     seed: Seed,
@@ -222,13 +256,13 @@ impl NetworkUse for Learning<'_, '_> {
     type Output = Result<TrainSummary, TrainError>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        let Self { config, data, gallery, model, folder, seed, hooks } = self;
+        let Self { on, config, source, facts, model, folder, seed, hooks } = self;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
-        let examples = Examples::of(data, model.network.specification(), network.scoping(), grain)?;
-        let gallery = gallery.filter(|_| model.variant.sees());
-        let run = Run { config, examples: &examples, gallery, model, folder, seed };
+        let source = if model.variant.sees() { source } else { source.without_pictures() };
+        let (specification, scoping) = (model.network.specification(), network.scoping());
+        let run = Run { config, source, facts, specification, scoping, grain, model, folder, seed };
         let (network, trained) = run.train(network, hooks)?;
-        write(folder, model, &network, &trained.standing.metrics)?;
+        write(folder, model, on, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;
         Ok(trained.summary())
     }
@@ -238,24 +272,27 @@ impl NetworkUse for Learning<'_, '_> {
         self,
         network: Detecting<D, N>,
     ) -> Self::Output {
-        let Self { config, data, gallery, model, folder, seed, hooks } = self;
-        let Some(gallery) = gallery else {
+        let Self { on, config, source, facts, model, folder, seed, hooks } = self;
+        let Source::Here(data, Some(gallery)) = source else {
             return Err(TrainError::Config {
                 key: "variant",
                 found: model.variant.to_string(),
-                allowed: "variants that see only with a dataset of pictures",
+                allowed: "variants with a detector only with a dataset of pictures whose trials are in memory",
             });
         };
         let (detector, programmer) = network.into_parts();
-        let (detector, standing) = DetectorRun { config, data, gallery, model, folder, seed }.train(detector, hooks)?;
+        let hash = facts.hash.clone();
+        let detecting = DetectorRun { config, data, hash, gallery, model, folder, seed };
+        let (detector, standing) = detecting.train(detector, hooks)?;
         let detected = detector::detected(&detector, data, gallery)?;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
-        let examples = Examples::of(&detected, SpecificationForm::Trajectories, programmer.scoping(), grain)?;
-        let run = Run { config, examples: &examples, gallery: None, model, folder, seed };
+        let (specification, scoping) = (SpecificationForm::Trajectories, programmer.scoping());
+        let (source, facts) = (Source::Here(&detected, None), &facts_of(&detected)?);
+        let run = Run { config, source, facts, specification, scoping, grain, model, folder, seed };
         let (programmer, trained) = run.train(programmer, hooks)?;
         detector_metrics::write(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
         let network = Detecting::new(detector, programmer, data.n_slots);
-        write(folder, model, &network, &trained.standing.metrics)?;
+        write(folder, model, on, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;
         let summary = trained.summary();
         let dropped_gradients = summary.dropped_gradients + standing.dropped_gradients;
@@ -263,25 +300,17 @@ impl NetworkUse for Learning<'_, '_> {
     }
 }
 
-/// The one family of a dataset.
-fn family(data: &DatasetTrials) -> Result<crate::task::Family, TrainError> {
-    let first = data.trials.first().ok_or(TrainError::NoTrials { total: 0 })?;
-    match data.trials.iter().find(|trial| trial.family != first.family) {
-        Some(other) => Err(TrainError::MixedFamilies {
-            trial: other.trial,
-            task: other.task_id.clone(),
-            found: other.family.name(),
-            expected: first.family.name(),
-        }),
-        None => Ok(first.family),
-    }
-}
-
 /// The model's files; `config.json` last, since it says that the model is there.
-fn write<N: Network>(folder: &Path, model: &ModelConfig, network: &N, metrics: &[Metric]) -> Result<(), TrainError> {
+fn write<N: Network>(
+    folder: &Path,
+    model: &ModelConfig,
+    on: ComputeDevice,
+    network: &N,
+    metrics: &[Metric],
+) -> Result<(), TrainError> {
     let path = folder.join(WEIGHTS_FILE);
     artifact::write(&path, &weights_to_bytes(network, &path)?)?;
     metrics::write(&folder.join(METRICS_FILE), metrics)?;
-    artifact::write_json(&folder.join(CONFIG_FILE), model)?;
+    artifact::write_json(&folder.join(CONFIG_FILE), &model.clone().trained_on(on))?;
     Ok(())
 }

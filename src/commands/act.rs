@@ -26,7 +26,7 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
     let first = demonstrations.first().context("an episode that was found")?;
     let mut driver = match args.model.to_str() {
         Some(ORACLE) => Driver::Oracle,
-        _ => Driver::load(&args.model, first)?,
+        _ => Driver::load(&args.model, args.device.device, first)?,
     };
     let counts = args.counts.clone().unwrap_or_else(|| first.provenance.counts.clone());
     let trials = |demonstration| {

@@ -9,11 +9,18 @@ use std::sync::atomic::AtomicBool;
 use crate::artifact;
 use crate::cli::{Part, ScopeArgs, StageArgs};
 use crate::commands::{CommandOutcome, output};
+use crate::model::ComputeDevice;
 use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Status};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
-pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
-    let (_, reports) = run_stages(args, from, to, stop)?;
+pub(super) fn run(
+    args: &StageArgs,
+    device: ComputeDevice,
+    from: Stage,
+    to: Stage,
+    stop: &Arc<AtomicBool>,
+) -> anyhow::Result<CommandOutcome> {
+    let (_, reports) = run_stages(args, device, from, to, stop)?;
     if args.json {
         output::print_json(&reports)?;
     } else {
@@ -29,9 +36,9 @@ pub(super) fn run(args: &StageArgs, from: Stage, to: Stage, stop: &Arc<AtomicBoo
 /// Makes the report and prints it.
 pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
     if scope(&args.scope) != Scope::Whole {
-        return run(args, Stage::Report, Stage::Report, stop);
+        return run(args, ComputeDevice::Cpu, Stage::Report, Stage::Report, stop);
     }
-    let (dir, reports) = run_stages(args, Stage::Report, Stage::Report, stop)?;
+    let (dir, reports) = run_stages(args, ComputeDevice::Cpu, Stage::Report, Stage::Report, stop)?;
     if args.dry_run {
         reports.iter().try_for_each(|report| output::print(&line(report)))?;
         return Ok(CommandOutcome::Done);
@@ -50,6 +57,7 @@ pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result
 
 fn run_stages(
     args: &StageArgs,
+    device: ComputeDevice,
     from: Stage,
     to: Stage,
     stop: &Arc<AtomicBool>,
@@ -61,6 +69,7 @@ fn run_stages(
         to,
         scope: scope(&args.scope),
         jobs: args.jobs.map_or_else(all_cores, usize::from),
+        device,
         dry_run: args.dry_run,
         force: args.force,
         no_lock: args.no_lock,

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::cli::{ScopeArgs, StageArgs, TasksArgs};
 use crate::commands::{CommandOutcome, output, stages};
+use crate::model::ComputeDevice;
 use crate::pipeline::Stage;
 use crate::task::{self, Split, TaskSet};
 
@@ -25,7 +26,7 @@ pub(super) fn run(args: &TasksArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Co
         no_lock: false,
         json: args.json,
     };
-    stages::run(&stage_args, Stage::Tasks, Stage::Tasks, stop)
+    stages::run(&stage_args, ComputeDevice::Cpu, Stage::Tasks, Stage::Tasks, stop)
 }
 
 fn run_import(args: &TasksArgs, path: &Path) -> anyhow::Result<CommandOutcome> {

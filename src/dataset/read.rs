@@ -5,4 +5,5 @@ pub(crate) mod playback;
 pub(crate) mod summary;
 pub(crate) mod table_files;
 pub(crate) mod trial_data;
+pub(crate) mod trial_spool;
 pub(crate) mod trials;

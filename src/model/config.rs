@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::colour_slots::ColourSlotsConfig;
 use crate::model::detector::{PointDetectorConfig, VggDetectorConfig};
+use crate::model::device::ComputeDevice;
 use crate::model::encoder_kind::EncoderKind;
 use crate::model::instructed::InstructedConfig;
 use crate::model::keypoints::KeypointsConfig;
@@ -232,6 +233,9 @@ pub struct ModelConfig {
     pub network: NetworkConfig,
     /// How it was trained, for people; loading does not read it.
     pub training: serde_json::Value,
+    /// On which device, for people; `None` for the processor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<String>,
 }
 
 impl ModelConfig {
@@ -260,7 +264,14 @@ impl ModelConfig {
             tasks: Vec::new(),
             network: NetworkConfig::of(variant, specification),
             training,
+            trained_on: None,
         }
+    }
+
+    /// The same, saying where it was trained.
+    #[must_use]
+    pub(crate) fn trained_on(self, device: ComputeDevice) -> Self {
+        Self { trained_on: (!device.is_cpu()).then(|| device.to_string()), ..self }
     }
 
     /// Whether a network can be made of it.
@@ -269,7 +280,8 @@ impl ModelConfig {
     ///
     /// [`ConfigError`] for the first key that makes no sense, with what is allowed.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let Self { version: _, variant, family: _, n_slots, vocabulary: _, tasks, network, training: _ } = self;
+        let Self { version: _, variant, family: _, n_slots, vocabulary: _, tasks, network, training: _, trained_on: _ } =
+            self;
         check_sizes(&[("n_slots", *n_slots)])?;
         ConfigError::unless(network.is_for(*variant), "network", network.name(), "widths of the variant's encoder")?;
         let knows_tasks = variant.scoping() == ScopingKind::Arguments;

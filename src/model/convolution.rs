@@ -5,6 +5,7 @@
 //! ```
 //!
 //! A tile fits a core's cache and is forgotten after its product; both gradients are products of such tiles too.
+//! That is on the processor; elsewhere burn's own convolution does the same.
 //!
 //! # Shapes
 //!
@@ -26,10 +27,13 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, Flex, backend_extension};
 use burn::module::{Module, Param};
+use burn::tensor::module::conv2d;
+use burn::tensor::ops::ConvOptions;
 use burn::tensor::{Device, Tensor};
 
 use crate::model::convolution::products::{bias_gradient, convolve, input_gradient, weight_gradient};
 use crate::model::convolution::tiles::Geometry;
+use crate::model::device::is_processor;
 
 /// A convolution with a square kernel.
 #[derive(Module, Debug)]
@@ -55,9 +59,24 @@ impl Convolution {
     /// `[F, height, width, channels]` → `[F, (height + 2 padding - kernel) / stride + 1, …, outputs]`
     pub(crate) fn forward(&self, pictures: Tensor<4>) -> Tensor<4> {
         let &Self { kernel, stride, padding, .. } = self;
+        if !is_processor(&pictures.device()) {
+            return self.forward_elsewhere(pictures);
+        }
         let geometry = Geometry { pictures: pictures.dims(), kernel, stride, padding };
         let [weight, bias] = [self.weight.val().into_dispatch(), self.bias.val().into_dispatch()];
         Tensor::from_dispatch(<Dispatch as Convolve>::convolve(pictures.into_dispatch(), weight, bias, geometry))
+    }
+}
+
+impl Convolution {
+    /// By burn's own convolution, whose channels lie first. In which order they lie while it works is its own business.
+    fn forward_elsewhere(&self, pictures: Tensor<4>) -> Tensor<4> {
+        let &Self { kernel, stride, padding, .. } = self;
+        let (n_inputs, n_outputs) = (pictures.dims()[3], self.bias.dims()[0]);
+        let weight = self.weight.val().reshape([kernel, kernel, n_inputs, n_outputs]).permute([3, 2, 0, 1]);
+        let options = ConvOptions::new([stride; 2], [padding; 2], [1; 2], 1);
+        let output = conv2d(pictures.permute([0, 3, 1, 2]), weight, Some(self.bias.val()), options);
+        output.permute([0, 2, 3, 1])
     }
 }
 

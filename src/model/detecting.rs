@@ -16,10 +16,10 @@ use crate::model::detector::{self, Detector};
 use crate::model::network::{CalledWith, CoreOutput, Network};
 use crate::model::pictures::{PictureIndex, Pictures};
 use crate::model::read_error::ReadError;
+use crate::model::running_programs::RunningPrograms;
 use crate::model::scoping_kind::ScopingKind;
 use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
-use crate::program::Program;
 use crate::trace::{ObservationRows, Span};
 
 /// A detector and a network behind it.
@@ -120,19 +120,19 @@ impl<D: Detector, N: Network<Percepts = ()> + ModuleDisplay> Network for Detecti
     fn core(
         &self,
         reading: &N::Reading,
-        program: Program,
+        running: RunningPrograms<'_>,
         steps: &[usize],
         recall: Option<N::Recall>,
     ) -> (CoreOutput, N::Recall) {
-        self.programmer.core(reading, program, steps, recall)
+        self.programmer.core(reading, running, steps, recall)
     }
 
-    fn scope(&self, reading: &N::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>> {
-        self.programmer.scope(reading, program, core)
+    fn scope(&self, reading: &N::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Option<Tensor<3>> {
+        self.programmer.scope(reading, running, core)
     }
 
-    fn argument(&self, reading: &N::Reading, program: Program, core: &CoreOutput) -> Tensor<2> {
-        self.programmer.argument(reading, program, core)
+    fn argument(&self, reading: &N::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Tensor<2> {
+        self.programmer.argument(reading, running, core)
     }
 
     fn device(&self) -> Device {

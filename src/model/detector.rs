@@ -122,14 +122,31 @@ pub struct DetectionLoss {
 
 /// How far detections are from positions in the world, `[F * N]` in metres.
 pub(crate) fn loss(detections: Tensor<2>, positions: &[[f32; 3]]) -> Result<DetectionLoss, TensorError> {
-    let device = detections.device();
-    let positions: Vec<f32> = positions.as_flattened().iter().map(|value| value * PER_METRE).collect();
-    let positions = Tensor::<2>::from_data(TensorData::new(positions, detections.dims()), &device);
-    let errors = detections - positions;
+    let errors = errors(detections, positions);
     let distances = values(errors.clone())?;
     let distances = distances.as_chunks::<AXES>().0;
     let length = |error: &[f32; AXES]| error.iter().map(|value| value * value).sum::<f32>().sqrt();
     let distance_m = distances.iter().map(length).sum::<f32>() / distances.len().max(1) as f32 / PER_METRE;
+    Ok(DetectionLoss { total: mean_error(errors), distance_m })
+}
+
+/// The same without a stop: the mean error, to be differentiated, and the mean distance in metres.
+pub(crate) fn loss_and_distance(detections: Tensor<2>, positions: &[[f32; 3]]) -> [Tensor<1>; 2] {
+    let errors = errors(detections, positions);
+    let squares = errors.clone().square().reshape([positions.len(), AXES]).sum_dim(1);
+    [mean_error(errors), squares.sqrt().mean() / PER_METRE]
+}
+
+/// In the detector's unit of length.
+fn errors(detections: Tensor<2>, positions: &[[f32; 3]]) -> Tensor<2> {
+    let device = detections.device();
+    let positions: Vec<f32> = positions.as_flattened().iter().map(|value| value * PER_METRE).collect();
+    let positions = Tensor::<2>::from_data(TensorData::new(positions, detections.dims()), &device);
+    detections - positions
+}
+
+/// Linear in what is large, and smooth about nothing.
+fn mean_error(errors: Tensor<2>) -> Tensor<1> {
     let smooth = (errors.powf_scalar(2.0) + SMALL_ERROR * SMALL_ERROR).sqrt() - SMALL_ERROR;
-    Ok(DetectionLoss { total: smooth.mean(), distance_m })
+    smooth.mean()
 }

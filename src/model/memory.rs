@@ -8,9 +8,10 @@
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
 
-use crate::model::layers::Init;
+use crate::model::layers::{Init, repeat_row};
 use crate::model::linear::Linear;
 use crate::model::network::CoreOutput;
+use crate::model::running_programs::{RunningPrograms, one_hot};
 use crate::program::Program;
 
 /// Embeddings of programs, and the keys they are found by.
@@ -40,6 +41,21 @@ impl ProgramMemory {
     /// `[1, embedding]`
     pub fn embedding(&self, program: Program) -> Tensor<2> {
         self.programs.val().narrow(0, program.index(), 1)
+    }
+
+    /// The embeddings of the running programs of `n_rows` decisions, a row each.
+    ///
+    /// # Shapes
+    ///
+    /// `[B, embedding]`
+    pub(crate) fn rows(&self, running: RunningPrograms<'_>, n_rows: usize) -> Tensor<2> {
+        match running {
+            RunningPrograms::One(program) => repeat_row(self.embedding(program), n_rows),
+            RunningPrograms::Each(programs) => {
+                let all = self.programs.val();
+                Tensor::<2>::from_data(one_hot(programs, all.dims()[0]), &all.device()).matmul(all)
+            }
+        }
     }
 
     /// How well each row's key fits: the logits of the next program.

@@ -5,10 +5,10 @@ use burn::tensor::{Device, Tensor};
 
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::read_error::ReadError;
+use crate::model::running_programs::RunningPrograms;
 use crate::model::scoping_kind::{MAX_ARGUMENTS, ScopingKind};
 use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
-use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::seed::Seed;
 use crate::trace::{ObservationRows, Span};
@@ -110,17 +110,17 @@ pub trait Network: Module + Sync + 'static {
     fn core(
         &self,
         reading: &Self::Reading,
-        program: Program,
+        running: RunningPrograms<'_>,
         steps: &[usize],
         recall: Option<Self::Recall>,
     ) -> (CoreOutput, Self::Recall);
 
     /// Logits of the scoping labels, `[B, T, 4]`, arbitrary beyond a window; nothing where none are decided.
-    fn scope(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>>;
+    fn scope(&self, reading: &Self::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Option<Tensor<3>>;
 
     /// Logits over the slots, a row for each of a decision's arguments: `[B * arguments, N]`, see
     /// [`ScopingKind::n_arguments`].
-    fn argument(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Tensor<2>;
+    fn argument(&self, reading: &Self::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Tensor<2>;
 
     /// Where the parameters are.
     fn device(&self) -> Device;

@@ -18,16 +18,16 @@ use burn::module::{Module, ModuleDisplay, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::model::core_network::{Core, LstmCore};
-use crate::model::layers::{Init, repeat_row};
+use crate::model::layers::Init;
 use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CalledWith, CoreOutput, Network};
 use crate::model::pictures::Pictures;
 use crate::model::read_error::ReadError;
+use crate::model::running_programs::RunningPrograms;
 use crate::model::scoping_kind::ScopingKind;
 use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
-use crate::program::Program;
 use crate::seed::Seed;
 use crate::trace::{ObservationRows, Span};
 
@@ -117,9 +117,8 @@ impl<E: CallEncoder> Npi<E> {
         chosen.matmul(self.tasks.val())
     }
 
-    fn program(&self, reading: &NpiReading<E::Reading>, program: Program) -> Tensor<2> {
-        let n_rows = reading.tasks.dims()[0];
-        repeat_row(self.memory.embedding(program), n_rows) + reading.tasks.clone()
+    fn program(&self, reading: &NpiReading<E::Reading>, running: RunningPrograms<'_>) -> Tensor<2> {
+        self.memory.rows(running, reading.tasks.dims()[0]) + reading.tasks.clone()
     }
 }
 
@@ -153,21 +152,21 @@ impl<E: CallEncoder> Network for Npi<E> {
     fn core(
         &self,
         reading: &Self::Reading,
-        program: Program,
+        running: RunningPrograms<'_>,
         steps: &[usize],
         recall: Option<Self::Recall>,
     ) -> (CoreOutput, Self::Recall) {
-        let input = Tensor::cat(vec![E::state(&reading.calls), self.program(reading, program)], 1);
+        let input = Tensor::cat(vec![E::state(&reading.calls), self.program(reading, running)], 1);
         let (hidden, recall) = self.core.run(input, steps, recall);
         (self.memory.decide(&self.key_and_end, hidden), recall)
     }
 
-    fn scope(&self, _reading: &Self::Reading, _program: Program, _core: &CoreOutput) -> Option<Tensor<3>> {
+    fn scope(&self, _reading: &Self::Reading, _running: RunningPrograms<'_>, _core: &CoreOutput) -> Option<Tensor<3>> {
         None
     }
 
-    fn argument(&self, reading: &Self::Reading, program: Program, core: &CoreOutput) -> Tensor<2> {
-        self.encoder.arguments(&reading.calls, self.program(reading, program), core.hidden.clone())
+    fn argument(&self, reading: &Self::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Tensor<2> {
+        self.encoder.arguments(&reading.calls, self.program(reading, running), core.hidden.clone())
     }
 
     fn device(&self) -> Device {

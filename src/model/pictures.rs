@@ -52,6 +52,15 @@ impl Pictures {
         self.n += 1;
     }
 
+    /// Adds others of the same size; the first ones bring it.
+    pub(crate) fn append(&mut self, others: Self) {
+        let Self { n, width, height, rgb, grippers } = others;
+        (self.width, self.height) = (width, height);
+        self.n += n;
+        self.rgb.extend(rgb);
+        self.grippers.extend(grippers);
+    }
+
     /// Each by itself.
     pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
         self.rgb.chunks_exact(self.n_bytes().max(1))

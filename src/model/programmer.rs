@@ -10,17 +10,17 @@ use burn::tensor::{Device, Tensor};
 
 use crate::model::core_network::{Core, GruCore, Reactive};
 use crate::model::encoder::{ArgumentDecoder as _, Encoder, Widths};
-use crate::model::layers::{Init, repeat_row};
+use crate::model::layers::Init;
 use crate::model::linear::Linear;
 use crate::model::memory::ProgramMemory;
 use crate::model::network::{CalledWith, CoreOutput, Network};
 use crate::model::pictures::{PictureSample, Pictures};
 use crate::model::read_error::ReadError;
+use crate::model::running_programs::RunningPrograms;
 use crate::model::scoping::ScopeHead;
 use crate::model::scoping_kind::ScopingKind;
 use crate::model::specification_rows::States;
 use crate::model::windows::Windows;
-use crate::program::Program;
 use crate::seed::Seed;
 use crate::trace::Span;
 
@@ -79,11 +79,6 @@ impl<E: Encoder, C: Core> Programmer<E, C, E::Argument> {
             scoping,
         }
     }
-
-    /// The running program's embedding, a row each.
-    fn program(&self, program: Program, n_rows: usize) -> Tensor<2> {
-        repeat_row(self.memory.embedding(program), n_rows)
-    }
 }
 
 impl<E: Encoder, C: Core> Network for Programmer<E, C, E::Argument> {
@@ -128,28 +123,28 @@ impl<E: Encoder, C: Core> Network for Programmer<E, C, E::Argument> {
     fn core(
         &self,
         reading: &E::Reading,
-        program: Program,
+        running: RunningPrograms<'_>,
         steps: &[usize],
         recall: Option<C::Recall>,
     ) -> (CoreOutput, C::Recall) {
         let state = E::state(reading);
-        let program = self.program(program, state.dims()[0]);
+        let program = self.memory.rows(running, state.dims()[0]);
         let input = Tensor::cat(vec![E::context(reading), program, state], 1);
         let (hidden, recall) = self.core.run(input, steps, recall);
         (self.memory.decide(&self.key_and_end, hidden), recall)
     }
 
-    fn scope(&self, reading: &E::Reading, program: Program, core: &CoreOutput) -> Option<Tensor<3>> {
+    fn scope(&self, reading: &E::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Option<Tensor<3>> {
         let view = C::view(E::state(reading), core.hidden.clone());
-        let program = self.program(program, view.dims()[0]);
+        let program = self.memory.rows(running, view.dims()[0]);
         let head = self.scope.as_ref()?;
         Some(head.forward(E::frames(reading), Tensor::cat(vec![program, view], 1)))
     }
 
-    fn argument(&self, reading: &E::Reading, program: Program, core: &CoreOutput) -> Tensor<2> {
+    fn argument(&self, reading: &E::Reading, running: RunningPrograms<'_>, core: &CoreOutput) -> Tensor<2> {
         let hidden = core.hidden.clone();
         let view = C::view(E::state(reading), hidden.clone());
-        let program = self.program(program, view.dims()[0]);
+        let program = self.memory.rows(running, view.dims()[0]);
         self.argument.forward(reading, program, view, hidden)
     }
 

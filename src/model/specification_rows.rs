@@ -48,6 +48,14 @@ impl SpecificationRows {
         }
     }
 
+    /// The same with pictures that are counted from another one on.
+    pub(crate) fn counted_from(self, first: u32) -> Self {
+        match self {
+            Self::Pictures(pictures) => Self::Pictures(counted_from(pictures, first)),
+            other => other,
+        }
+    }
+
     /// Observations, to be changed; none in another form.
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = ObservationRowMut<'_>> {
         let rows = match self {
@@ -108,6 +116,22 @@ impl States {
         self.len() == 0
     }
 
+    /// That of one decision.
+    pub(crate) fn decision(&self, number: usize) -> Self {
+        match self {
+            Self::Observations(rows) => Self::Observations(rows.slice(number..number + 1)),
+            Self::Pictures(pictures) => Self::Pictures(vec![pictures[number]]),
+        }
+    }
+
+    /// The same with pictures that are counted from another one on.
+    pub(crate) fn counted_from(self, first: u32) -> Self {
+        match self {
+            Self::Pictures(pictures) => Self::Pictures(counted_from(pictures, first)),
+            observations @ Self::Observations(_) => observations,
+        }
+    }
+
     /// Of a network that reads observations.
     ///
     /// # Errors
@@ -157,4 +181,8 @@ impl States {
         }
         Ok(all.unwrap_or_else(|| Self::Pictures(Vec::new())))
     }
+}
+
+fn counted_from(pictures: Vec<PictureIndex>, first: u32) -> Vec<PictureIndex> {
+    pictures.into_iter().map(|picture| PictureIndex(picture.0 + first)).collect()
 }

@@ -205,16 +205,21 @@ fn pixels(config: &ModelConfig) -> String {
     config.network.pixels().map_or("none".to_owned(), |pixels| format!("of {pixels}x{pixels} pixels"))
 }
 
-/// Loads a trained model for inference and hands its network on.
+/// Loads a trained model onto a device for inference and hands its network on.
 ///
 /// # Errors
 ///
 /// As [`load_config`], and when the weights do not fit.
-pub fn load<U: NetworkUse>(folder: &Path, config: &ModelConfig, wanted: U) -> Result<U::Output, ModelError> {
+pub fn load<U: NetworkUse>(
+    folder: &Path,
+    config: &ModelConfig,
+    device: &Device,
+    wanted: U,
+) -> Result<U::Output, ModelError> {
     let path = folder.join(WEIGHTS_FILE);
     let bytes = artifact::read(&path)?;
     let loading = Loading { bytes, path: &path, wanted };
-    build(config, &mut Init::unfilled(&Device::flex()).knowing(config.programs()), loading)
+    build(config, &mut Init::unfilled(device).knowing(config.programs()), loading)
         .unwrap_or_else(|problem| Err(ModelError::Config { problem, path: folder.join(CONFIG_FILE) }))
 }
 
@@ -249,7 +254,7 @@ pub struct ModelSummary {
 /// As [`load`].
 pub fn inspect(folder: &Path) -> Result<ModelSummary, ModelError> {
     let config = load_config(folder)?;
-    Ok(ModelSummary { parameters: load(folder, &config, Parameters)?, config })
+    Ok(ModelSummary { parameters: load(folder, &config, &Device::flex(), Parameters)?, config })
 }
 
 /// How many numbers were learned.

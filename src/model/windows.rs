@@ -86,6 +86,18 @@ impl Windows {
         self.rows.pictures()
     }
 
+    /// One of the windows, without padding.
+    pub(crate) fn window(&self, number: usize) -> SpecificationRows {
+        let length = self.lengths.get(number).copied().unwrap_or_default();
+        let begin = number * self.n_frames;
+        let frames = begin..begin + length;
+        match &self.rows {
+            SpecificationRows::Observations(rows) => SpecificationRows::Observations(rows.slice(frames)),
+            SpecificationRows::Sentences(sentences) => SpecificationRows::Sentences(sentences[frames].to_vec()),
+            SpecificationRows::Pictures(pictures) => SpecificationRows::Pictures(pictures[frames].to_vec()),
+        }
+    }
+
     /// The pictures that each window shows, without padding.
     pub(crate) fn shown(&self) -> Result<Vec<&[PictureIndex]>, ReadError> {
         let windows = self.pictures()?.chunks_exact(self.n_frames.max(1)).zip(&self.lengths);

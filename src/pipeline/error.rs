@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::artifact::{ContractError, IoError, LockError};
 use crate::dataset::{ConvertError, DatasetError};
 use crate::feature::NotBuiltIn;
-use crate::model::ModelError;
+use crate::model::{DeviceError, ModelError};
 use crate::recording::RecordingError;
 #[cfg(feature = "report")]
 use crate::report::ReportError;
@@ -71,6 +71,9 @@ pub enum PipelineError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[expect(missing_docs, reason = "wraps an error that documents itself")]
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// A world or policy broke a rule of traces.
     #[error("{task_id}, trial {trial}: {source}")]
     Trace {
@@ -146,6 +149,7 @@ impl PipelineError {
         match self {
             Self::Syntax { .. } | Self::Value { .. } | Self::NotBuiltIn(_) => true,
             Self::Contract(error) => matches!(error, ContractError::OtherPlan { .. }),
+            Self::Device(error) => error.is_usage(),
             _ => false,
         }
     }

@@ -1,10 +1,13 @@
 //! The pictures that a variant that sees learns from: what the first camera filmed, from the dataset.
 
-use crate::dataset::{DatasetTrials, EpisodeRows, PictureLoader, Wanted};
+use std::path::PathBuf;
+
+use crate::dataset::{DatasetError, DatasetTrials, EpisodeRows, PictureLoader, Wanted};
 use crate::model::Pictures;
 use crate::pipeline::{Pipeline, PipelineError, RunDir};
+use crate::render::CameraConfig;
 use crate::trace::GripperState;
-use crate::training::Gallery;
+use crate::training::{Galleries, Gallery, TrainError};
 
 /// Decoded pictures that are kept for when they are drawn again: about 660 episodes of 33 pictures of 64 x 64 pixels.
 const MOST_BYTES: usize = 1 << 28;
@@ -22,11 +25,38 @@ pub(super) struct Streamed {
 ///
 /// When the dataset has no pictures of the camera, or none of a trial's frame: it was made before there was a camera.
 pub(super) fn open(pipeline: &Pipeline, run: &RunDir, trials: &DatasetTrials) -> Result<Streamed, PipelineError> {
-    let camera = pipeline.spec.generate.cameras.first();
-    let camera = camera.map(|camera| camera.name.as_str()).unwrap_or_default();
-    let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
-    let loader = PictureLoader::open(run.dataset().path(), camera, rows.collect(), MOST_BYTES)?;
-    Ok(Streamed { loader, grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect() })
+    Ok(OfBuffers::new(pipeline, run).find(trials)?)
+}
+
+/// Finds the pictures of whatever trials are in memory.
+pub(super) struct OfBuffers<'p> {
+    camera: Option<&'p CameraConfig>,
+    dataset: PathBuf,
+}
+
+impl<'p> OfBuffers<'p> {
+    pub(super) fn new(pipeline: &'p Pipeline, run: &RunDir) -> Self {
+        Self { camera: pipeline.spec.generate.cameras.first(), dataset: run.dataset().path().to_owned() }
+    }
+
+    fn find(&self, trials: &DatasetTrials) -> Result<Streamed, DatasetError> {
+        let camera = self.camera.map(|camera| camera.name.as_str()).unwrap_or_default();
+        let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
+        let loader = PictureLoader::open(&self.dataset, camera, rows.collect(), MOST_BYTES)?;
+        Ok(Streamed { loader, grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect() })
+    }
+}
+
+impl Galleries for OfBuffers<'_> {
+    fn size(&self) -> (usize, usize) {
+        let [width, height] =
+            self.camera.map(|camera| camera.size_px).unwrap_or_default().map(|pixels| pixels as usize);
+        (width, height)
+    }
+
+    fn open(&self, trials: &DatasetTrials) -> Result<Box<dyn Gallery>, TrainError> {
+        Ok(Box::new(self.find(trials)?))
+    }
 }
 
 impl Gallery for Streamed {

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::model::ComputeDevice;
 use crate::pipeline::Stage;
 
 /// What the command line chooses.
@@ -17,6 +18,8 @@ pub struct Options {
     pub scope: Scope,
     /// Threads.
     pub jobs: usize,
+    /// What networks learn and decide on. No part of any plan: weights differ in their last bits, as between processors.
+    pub device: ComputeDevice,
     /// Only say what would be done.
     pub dry_run: bool,
     /// Do again what is up to date.

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, Manifest, StageDir};
-use crate::model::{Decoder, ModelConfig, Variant, check_purpose, load_config};
+use crate::model::{ComputeDevice, Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, simulation_config, world};
@@ -22,7 +22,7 @@ use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
     self, Acted, DetectionRows, Limits, ModelFacts, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows, Sight,
-    Start, load_policy,
+    Start, load_policy_on,
 };
 use crate::seed::Seed;
 use crate::sim::Simulation;
@@ -213,7 +213,7 @@ fn learned(run: &RunDir, ModelActor { model, decoder }: ModelActor<'_>) -> Learn
 impl Learned {
     /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
     /// another variant.
-    fn policy(&self, pipeline: &Pipeline) -> Result<Box<dyn Policy>, PipelineError> {
+    fn policy(&self, pipeline: &Pipeline, device: ComputeDevice) -> Result<Box<dyn Policy>, PipelineError> {
         let found = load_config(&self.folder)?;
         let family = pipeline.spec.tasks.family;
         let mut wanted =
@@ -222,7 +222,7 @@ impl Learned {
             wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, wanted.n_slots);
         }
         check_purpose(&found, &wanted, &self.folder)?;
-        Ok(load_policy(&self.folder, self.decoder)?.1)
+        Ok(load_policy_on(&device.open()?, &self.folder, self.decoder)?.1)
     }
 }
 
@@ -341,7 +341,7 @@ impl Acting<'_> {
 
     fn policy(&self, starts: &[Start<'_>]) -> Result<Box<dyn Policy>, PipelineError> {
         Ok(match &self.learned {
-            Some(learned) => learned.policy(self.pipeline)?,
+            Some(learned) => learned.policy(self.pipeline, self.job.context.options.device)?,
             None => Box::new(Oracle::for_starts(starts)),
         })
     }

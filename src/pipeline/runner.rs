@@ -20,6 +20,7 @@ use crate::progress::Stopwatch;
 /// The first thing that went wrong; what was committed before stays.
 pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
     check_scope(pipeline, options)?;
+    check_device(options)?;
     let _lock = lock(dir, options)?;
     if !options.dry_run && !options.scope.is_shared() {
         remove_partials(dir.root())?;
@@ -98,6 +99,15 @@ fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineErr
     };
     let problem = format!("{problem}; {allowed}");
     Err(PipelineError::Value { path: pipeline.path.clone(), key: key.to_owned(), problem })
+}
+
+/// Refuses a device that cannot be used, where one is needed.
+fn check_device(options: &Options) -> Result<(), PipelineError> {
+    let is_needed = options.from <= Stage::Rollout && options.to >= Stage::Train && !options.dry_run;
+    if is_needed {
+        options.device.open()?;
+    }
+    Ok(())
 }
 
 /// A whole run has its directory alone and clears away what a killed one left; items are done side by side.

@@ -1,18 +1,20 @@
 //! Stage `train`: one model for each variant and seed, from the dataset alone.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use serde_json::{Value, json};
 
-use crate::artifact::StageDir;
-use crate::dataset::{self, DatasetTrials};
+use crate::artifact::{IoError, StageDir};
+use crate::dataset::{self, DatasetTrials, LearnedTrials, TrialData};
 use crate::model::{CONFIG_FILE, WEIGHTS_FILE};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, gallery, tasks};
 use crate::task::Split;
-use crate::training::{self, DETECTOR_METRICS_FILE, Gallery, Hooks, METRICS_FILE};
+use crate::training::{self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Source, TrialStream};
 
+/// Boundary frames of a dataset above which trials are streamed from disk: those below take 700 MB at most.
+const MOST_FRAMES: u64 = 1_500_000;
 /// Raised when the same settings train another model.
 const VERSION: u32 = 1;
 
@@ -89,7 +91,7 @@ impl Unit for Model<'_> {
     }
 
     fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
-        Ok(Box::new(Trainer { unit: self, job, trials: training_trials(self, job.context.dir)? }))
+        Ok(Box::new(Trainer { unit: self, job, trials: training_trials(self, job)? }))
     }
 }
 
@@ -97,14 +99,28 @@ impl Unit for Model<'_> {
 struct Trainer<'j> {
     unit: &'j Model<'j>,
     job: &'j Job<'j>,
-    trials: DatasetTrials,
+    trials: Trials,
+}
+
+/// What a model learns from.
+enum Trials {
+    Here(DatasetTrials),
+    /// Too many for memory.
+    Streamed(TrialStream),
+}
+
+impl Trials {
+    fn len(&self) -> usize {
+        match self {
+            Self::Here(data) => data.trials.len(),
+            Self::Streamed(stream) => stream.n_trials(),
+        }
+    }
 }
 
 impl Worker for Trainer<'_> {
     fn shard(&self, shard: u32) -> Result<Option<Made>, PipelineError> {
         let Self { unit, job, trials } = self;
-        let gallery = unit.spec.variant.sees().then(|| gallery::open(unit.pipeline, job.context.dir, trials));
-        let gallery = gallery.transpose()?;
         let training = unit.spec.training(unit.seed).resolved();
         let progress = &job.progress;
         let mut shown = None;
@@ -119,8 +135,19 @@ impl Worker for Trainer<'_> {
         // A twin on another machine that was first leaves nothing to do.
         let should_stop = || job.context.go_on().is_err() || job.is_done(shard).unwrap_or(false);
         let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &should_stop };
-        let gallery = gallery.as_ref().map(|gallery| gallery as &dyn Gallery);
-        let summary = training::train_on_pictures(&training, trials, gallery, job.dir.path(), &mut hooks);
+        let on = job.context.options.device;
+        let mut train = |source: Source<'_>| training::train_from(on, &training, source, job.dir.path(), &mut hooks);
+        let sees = unit.spec.variant.sees();
+        let summary = match trials {
+            Trials::Here(data) => {
+                let gallery = sees.then(|| gallery::open(unit.pipeline, job.context.dir, data)).transpose()?;
+                train(Source::Here(data, gallery.as_ref().map(|gallery| gallery as &dyn Gallery)))
+            }
+            Trials::Streamed(stream) => {
+                let galleries = sees.then(|| gallery::OfBuffers::new(unit.pipeline, job.context.dir));
+                train(Source::Streamed(stream, galleries.as_ref().map(|galleries| galleries as &dyn Galleries)))
+            }
+        };
         job.context.go_on()?;
         if job.is_done(shard)? {
             return Ok(None);
@@ -132,15 +159,25 @@ impl Worker for Trainer<'_> {
             n => format!(", {n} gradients that were no numbers left out"),
         };
         let told = Some(format!("{} steps, {} examples{dropped}", summary.steps, summary.examples));
-        Ok(Some(Made { episodes: trials.trials.len() as u64, told, ..made }))
+        Ok(Some(Made { episodes: trials.len() as u64, told, ..made }))
     }
 }
 
-/// The trials a model may train on: successful ones of the first training tasks.
-fn training_trials(unit: &Model<'_>, run: &RunDir) -> Result<DatasetTrials, PipelineError> {
-    let mut trials = dataset::read_trials(run.dataset().path())?;
+/// The trials a model may train on: successful ones of the first training tasks. A detector looks at all of them, so that
+/// they are always in memory; pictures never are.
+fn training_trials(unit: &Model<'_>, job: &Job<'_>) -> Result<Trials, PipelineError> {
+    let run = job.context.dir;
     let allowed: Vec<String> = tasks::training(unit.pipeline, run)?.into_iter().map(|task| task.id).collect();
-    let allowed = &allowed[..unit.train_tasks() as usize];
-    trials.trials.retain(|trial| trial.split == Split::Seen && allowed.contains(&trial.task_id));
-    Ok(trials)
+    let allowed: HashSet<&String> = allowed[..unit.train_tasks() as usize].iter().collect();
+    let is_taken = |trial: &TrialData| trial.split == Split::Seen && allowed.contains(&trial.task_id);
+    let most_frames = match (unit.spec.variant.detects(), unit.spec.training.most_frames_in_memory) {
+        (true, _) => u64::MAX,
+        (false, asked) => asked.unwrap_or(MOST_FRAMES),
+    };
+    let folder = job.dir.path();
+    std::fs::create_dir_all(folder).map_err(IoError::system("make", folder))?;
+    Ok(match dataset::read_learned_trials(run.dataset().path(), is_taken, most_frames, folder)? {
+        LearnedTrials::Here(data) => Trials::Here(data),
+        LearnedTrials::OnDisk(spool) => Trials::Streamed(TrialStream::new(spool, most_frames)?),
+    })
 }

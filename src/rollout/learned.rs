@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor};
 use rayon::iter::{
     IndexedParallelIterator as _, IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _,
 };
@@ -35,6 +35,19 @@ const END_THRESHOLD: f32 = 0.5;
 ///
 /// As [`model::load`].
 pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
+    load_policy_on(&Device::flex(), folder, decoder)
+}
+
+/// The same, deciding on a device.
+///
+/// # Errors
+///
+/// As [`model::load`].
+pub fn load_policy_on(
+    device: &Device,
+    folder: &Path,
+    decoder: Decoder,
+) -> Result<(ModelConfig, Box<dyn Policy + Send>), ModelError> {
     let config = model::load_config(folder)?;
     let deciding = Deciding {
         name: config.variant.name(),
@@ -42,7 +55,7 @@ pub fn load_policy(folder: &Path, decoder: Decoder) -> Result<(ModelConfig, Box<
         decoder,
         tasks: config.tasks.clone(),
     };
-    let policy = model::load(folder, &config, deciding)?;
+    let policy = model::load(folder, &config, device, deciding)?;
     Ok((config, policy))
 }
 
@@ -180,7 +193,7 @@ impl<N: Network> LearnedPolicy<N> {
         let window = N::window(&known.demonstration, query.window);
         let percepts = self.network.perceive(&query.seen)?;
         let reading = self.network.read(&window, &states(query), &percepts, &[called_with])?;
-        let (core, recall) = self.network.core(&reading, query.program, &[1], recall);
+        let (core, recall) = self.network.core(&reading, query.program.into(), &[1], recall);
         let (decision, arguments) = self.decision(query, &reading, &core)?;
         let callee = Running::called(CalledWith { task: None, arguments });
         Ok((decision, [Running { called_with, recall: Some(recall) }, callee]))
@@ -196,7 +209,7 @@ impl<N: Network> LearnedPolicy<N> {
         let end_probability = logistic(finite(scalar(core.end.clone())?, "the end of the program")?);
         let programs = all_finite(core.programs.clone(), "the next program")?;
         let (program, program_probability) = likeliest_program(programs, self.network.scoping());
-        let labels = program.is_composite().then(|| self.network.scope(reading, query.program, core)).flatten();
+        let labels = program.is_composite().then(|| self.network.scope(reading, query.program.into(), core)).flatten();
         let labels: Vec<LabelScores> = labels.map(label_scores).transpose()?.unwrap_or_default();
         let scope = self
             .decoder
@@ -231,7 +244,7 @@ impl<N: Network> LearnedPolicy<N> {
         let mut arguments = Arguments::default();
         let n_arguments = self.network.scoping().n_arguments_of(callee);
         if n_arguments > 0 {
-            let logits = all_finite(self.network.argument(reading, query.program, core), "the argument")?;
+            let logits = all_finite(self.network.argument(reading, query.program.into(), core), "the argument")?;
             let rows = logits.chunks_exact(query.specification.n_slots.max(1)).take(n_arguments);
             arguments.iter_mut().zip(rows).for_each(|(slot, row)| *slot = Some(SlotIndex(likeliest(row).0 as u16)));
         }

@@ -2,7 +2,8 @@
 //!
 //! # Input and output
 //!
-//! Under the model's folder: `checkpoint/step-NNNNNNNN.safetensors` (weights), `….adam` (the optimizer's moments) and
+//! Under the model's folder: `checkpoint/step-NNNNNNNN.safetensors` (weights), `….moments.safetensors`
+//! (the optimizer's moments) and
 //! `checkpoint/latest.json`, which is written last and names the two with their hashes. It alone says what counts. A
 //! detector, which learns first, has its own in `checkpoint/detector/`.
 
@@ -23,6 +24,8 @@ use crate::training::metrics::Metric;
 const FOLDER: &str = "checkpoint";
 /// Under that, for a detector.
 const DETECTOR_FOLDER: &str = "detector";
+/// How the file of the optimizer's moments ends.
+const MOMENTS: &str = "moments.safetensors";
 /// What names the parts of the checkpoint that counts.
 const LATEST_FILE: &str = "latest.json";
 
@@ -100,15 +103,13 @@ impl<'c> Checkpoints<'c> {
         let before = self.latest::<S>()?;
         let stem = format!("step-{:08}", standing.step());
         let path = self.folder.join(&stem);
-        let optimizer = learner
-            .optimizer_bytes()
-            .map_err(|problem| TrainError::Checkpoint { problem, path: path.with_extension("adam") })?;
+        let optimizer = learner.optimizer_bytes(&path.with_extension(MOMENTS))?;
         let latest = Latest {
             model: self.model.clone(),
             dataset: self.dataset.clone(),
             standing: standing.clone(),
             weights: self.write(format!("{stem}.safetensors"), &weights_to_bytes(learner.module(), &path)?)?,
-            optimizer: self.write(format!("{stem}.adam"), &optimizer)?,
+            optimizer: self.write(format!("{stem}.{MOMENTS}"), &optimizer)?,
         };
         artifact::write_json(&self.latest_path(), &latest)?;
         if let Some(before) = before.filter(|before| before.standing.step() != standing.step()) {
@@ -124,9 +125,7 @@ impl<'c> Checkpoints<'c> {
         &self,
         learner: Learner<M>,
     ) -> Result<Result<Resumed<M, S>, Learner<M>>, TrainError> {
-        let Some(latest) =
-            self.latest::<S>()?.filter(|latest| latest.model == *self.model && latest.dataset == self.dataset)
-        else {
+        let Some(latest) = self.latest::<S>()?.filter(|latest| self.is_of(latest)) else {
             return Ok(Err(learner));
         };
         let path = self.folder.join(&latest.weights.file);
@@ -134,9 +133,14 @@ impl<'c> Checkpoints<'c> {
         let path = self.folder.join(&latest.optimizer.file);
         let learner = learner
             .with_module(module)
-            .with_optimizer(self.read(&latest.optimizer)?)
-            .map_err(|problem| TrainError::Checkpoint { problem, path })?;
+            .with_optimizer(self.read(&latest.optimizer)?, &path)
+            .map_err(|error| TrainError::Checkpoint { problem: error.to_string(), path })?;
         Ok(Ok(Resumed { learner, standing: latest.standing }))
+    }
+
+    /// Whether a checkpoint is of this training. Those of before moments were safetensors are not taken.
+    fn is_of<S: Stands>(&self, latest: &Latest<S>) -> bool {
+        latest.model == *self.model && latest.dataset == self.dataset && latest.optimizer.file.ends_with(MOMENTS)
     }
 
     /// Removes what is left once the model itself is written; what names the parts first, so that no checkpoint is ever

@@ -164,6 +164,10 @@ pub struct TrainConfig {
     /// How a detector is trained before the network behind it; for variants that have one.
     #[serde(skip_serializing_if = "DetectorTraining::is_default")]
     pub detector: DetectorTraining,
+    /// Boundary frames of the training trials above which these are streamed from disk through a buffer, in an order that
+    /// the seed shuffles; by default 1 500 000. Variants with a detector keep theirs in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_frames_in_memory: Option<u64>,
     /// Steps between checkpoints.
     pub checkpoint_every: u32,
     /// Steps between rows of the metrics.
@@ -202,6 +206,7 @@ impl Default for TrainConfig {
             scope_kernel: None,
             relations: false,
             detector: DetectorTraining::default(),
+            most_frames_in_memory: None,
             checkpoint_every: 100,
             metrics_every: 10,
         }

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetTrials, Wanted};
 use crate::model::{
-    Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, positions_in_world, scalar,
+    Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, loss_and_distance,
+    positions_in_world, scalar,
 };
 use crate::seed::Seed;
 use crate::trace::{Observation, ObservationRows};
@@ -22,7 +23,6 @@ use crate::training::checkpoint::{Checkpoints, Resumed, Stands};
 use crate::training::config::TrainConfig;
 use crate::training::detector_metrics::DetectorMetric;
 use crate::training::learner::{Learner, Stepped};
-use crate::training::run::dataset_hash;
 use crate::training::seen::{all_frames, fetch, sample};
 use crate::training::{Gallery, Hooks, Progress, TrainError};
 
@@ -56,6 +56,8 @@ impl Stands for DetectorStanding {
 pub(super) struct DetectorRun<'r> {
     pub(super) config: &'r TrainConfig,
     pub(super) data: &'r DatasetTrials,
+    /// Of the data.
+    pub(super) hash: String,
     pub(super) gallery: &'r dyn Gallery,
     pub(super) model: &'r ModelConfig,
     pub(super) folder: &'r Path,
@@ -80,7 +82,7 @@ impl DetectorRun<'_> {
             let (task, problem) = (empty.task_id.clone(), "has no frames".to_owned());
             return Err(TrainError::Trial { task, trial: empty.trial, problem });
         }
-        let checkpoints = Checkpoints::of_detector(self.folder, self.model, dataset_hash(self.data));
+        let checkpoints = Checkpoints::of_detector(self.folder, self.model, self.hash.clone());
         let device = detector.device();
         let fresh = Learner::new(detector, device, self.config.clip_norm);
         let (mut learner, mut standing) = match checkpoints.resume(fresh)? {
@@ -134,22 +136,14 @@ impl DetectorRun<'_> {
             self.gallery.announce(&self.draw(standing.step + 1).concat());
         }
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
-        let weight = 1.0 / GROUPS as f32;
         let step = standing.step + 1;
-        let lose = |detector: &D, shown: &Shown| -> Result<_, TrainError> {
-            let loss = detection_loss(detector.detect(&shown.pictures)?, &shown.positions)?;
-            let total: Tensor<1> = loss.total * weight;
-            let found = scalar(total.clone())?;
-            if !found.is_finite() {
-                return Err(TrainError::NotFinite { step, level: "detector", found });
-            }
-            Ok(([found, loss.distance_m * weight], Some(total)))
+        let pictures = groups.iter().map(|shown| shown.pictures.n as u32).sum();
+        let Stepped { learner, losses: [loss, distance_m], dropped } = match learner.is_on_processor() {
+            true => learn_by_group(learner, &groups, learning_rate, step)?,
+            false => learn_at_once(learner, groups, learning_rate, step)?,
         };
-        let Stepped { learner, losses, dropped } = learner.step(&groups, learning_rate, lose)?;
-        let [loss, distance_m] = [0, 1].map(|at| losses.iter().map(|losses| losses[at]).sum::<f32>());
         standing.step = step;
         standing.dropped_gradients += u32::from(dropped);
-        let pictures = groups.iter().map(|shown| shown.pictures.n as u32).sum();
         if standing.step.is_multiple_of(self.config.metrics_every) || standing.step == self.config.detector.n_steps() {
             standing.metrics.push(DetectorMetric { step: standing.step, loss, distance_m, learning_rate, pictures });
         }
@@ -190,6 +184,53 @@ impl DetectorRun<'_> {
         let positions = positions_in_world(&ObservationRows::new(n_slots, rows), &pictures.grippers);
         Ok(Shown { pictures, positions })
     }
+}
+
+/// One step on the processor; the loss and the mean distance in metres.
+fn learn_by_group<D: Detector>(
+    learner: Learner<D>,
+    groups: &[Shown],
+    learning_rate: f64,
+    step: u32,
+) -> Result<Stepped<D, [f32; 2]>, TrainError> {
+    let weight = 1.0 / GROUPS as f32;
+    let lose = |detector: &D, shown: &Shown| -> Result<_, TrainError> {
+        let loss = detection_loss(detector.detect(&shown.pictures)?, &shown.positions)?;
+        let total: Tensor<1> = loss.total * weight;
+        let found = finite(scalar(total.clone())?, step)?;
+        Ok(([found, loss.distance_m * weight], Some(total)))
+    };
+    let Stepped { learner, losses, dropped } = learner.step(groups, learning_rate, lose)?;
+    let losses = [0, 1].map(|at| losses.iter().map(|losses| losses[at]).sum::<f32>());
+    Ok(Stepped { learner, losses, dropped })
+}
+
+/// One step on an accelerator, with the pictures of all groups, which are equally many, together.
+fn learn_at_once<D: Detector>(
+    learner: Learner<D>,
+    groups: Vec<Shown>,
+    learning_rate: f64,
+    step: u32,
+) -> Result<Stepped<D, [f32; 2]>, TrainError> {
+    let mut all = Shown { pictures: Pictures::default(), positions: Vec::new() };
+    for Shown { pictures, positions } in groups {
+        all.pictures.append(pictures);
+        all.positions.extend(positions);
+    }
+    let lose = |detector: &D| -> Result<_, TrainError> {
+        let [loss, distance] = loss_and_distance(detector.detect(&all.pictures)?, &all.positions);
+        Ok((Tensor::cat(vec![loss.clone(), distance], 0), loss))
+    };
+    let told = |read: &[f32]| match *read {
+        [loss, distance_m] => Ok([finite(loss, step)?, distance_m]),
+        _ => Err(TrainError::NotFinite { step, level: "detector", found: f32::NAN }),
+    };
+    learner.step_at_once(learning_rate, lose, told)
+}
+
+/// A loss that is none ends the training.
+fn finite(found: f32, step: u32) -> Result<f32, TrainError> {
+    if found.is_finite() { Ok(found) } else { Err(TrainError::NotFinite { step, level: "detector", found }) }
 }
 
 /// The same trials as a detector sees them: observations are what it finds in their pictures.

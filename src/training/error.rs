@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use crate::artifact::IoError;
-use crate::model::{CONFIG_FILE, ConfigError, ModelError, ReadError, TensorError};
+use crate::dataset::DatasetError;
+use crate::model::{CONFIG_FILE, ConfigError, DeviceError, ModelError, ReadError, TensorError};
 use crate::table::TableError;
 
 /// A training that cannot go on.
@@ -22,6 +23,9 @@ pub enum TrainError {
     /// No network can be made with the settings.
     #[error("{}: {}", CONFIG_FILE, .0)]
     Network(#[from] ConfigError),
+    /// It cannot be computed where it was asked to be.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// The dataset has nothing to learn from.
     #[error("none of the dataset's {total} successful episodes is of a training task")]
     NoTrials {
@@ -76,6 +80,9 @@ pub enum TrainError {
         /// The file.
         path: PathBuf,
     },
+    /// What is learned from could not be read again.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
     /// The learning curves could not be stored.
     #[error(transparent)]
     Metrics(#[from] TableError),

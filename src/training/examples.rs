@@ -144,9 +144,29 @@ impl<'d> Examples<'d> {
         Ok(Self { data, specification, parts, scoping, grain, trees, tasks, task_of_trial, levels })
     }
 
+    /// The same trials as a part of more: levels and tasks are numbered as those of all. A level that runs in none of
+    /// these tasks cannot be drawn.
+    pub(super) fn among(mut self, levels: &[(Program, bool)], task_ids: &[String]) -> Self {
+        let number = |trials: &Vec<usize>| task_ids.binary_search(&self.data.trials[trials[0]].task_id).ok();
+        let numbers: Vec<Option<usize>> = self.tasks.iter().map(number).collect();
+        let renumbered = |task: Option<usize>| task.and_then(|task| numbers[task]);
+        self.task_of_trial = self.task_of_trial.into_iter().map(renumbered).collect();
+        let mut own: BTreeMap<Program, Level> = self.levels.into_iter().map(|level| (level.program, level)).collect();
+        let level = |&(program, is_root): &(Program, bool)| {
+            own.remove(&program).unwrap_or(Level { program, is_root, tasks: Vec::new() })
+        };
+        self.levels = levels.iter().map(level).collect();
+        self
+    }
+
     /// The programs that decide, in the order of the program memory, and whether each is a root.
     pub fn levels(&self) -> impl Iterator<Item = (Program, bool)> {
         self.levels.iter().map(|level| (level.program, level.is_root))
+    }
+
+    /// Whether a level runs in any of the trials.
+    pub(super) fn has_level(&self, level_idx: usize) -> bool {
+        self.levels.get(level_idx).is_some_and(|level| !level.tasks.is_empty())
     }
 
     /// Ids of the tasks that are learned from, in order.

@@ -2,18 +2,22 @@
 //!
 //! # Invariants
 //!
-//! Groups run side by side on the current rayon pool, each on a copy of the parameters with a gradient graph of its
-//! own. Their gradients are summed in the order of the groups, so the pool's size changes nothing.
+//! On the processor groups run side by side on the current rayon pool, each on a copy of the parameters with a gradient
+//! graph of its own. Their gradients are summed in the order of the groups, so the pool's size changes nothing.
+//! Elsewhere all groups are one batch, and a step stops once, to read what is told of it.
 
-use burn::module::{Module, ModuleVisitor, Param};
-use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use std::path::Path;
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::optim::GradientsParams;
 use burn::tensor::activation::{log_softmax, relu};
-use burn::tensor::{Bytes, Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use crate::model::{Network, ReadError, TensorError, scalar, values};
+use crate::model::{ModelError, Network, ReadError, TensorError, is_processor, scalar, values};
 use crate::trace::ScopingLabel;
 use crate::training::TrainError;
+use crate::training::adam::Adam;
 use crate::training::batch::{Group, Part};
 use crate::training::config::LossWeights;
 
@@ -54,7 +58,9 @@ impl Losses {
 pub struct Learner<M> {
     module: M,
     device: Device,
-    optimizer: ModuleOptimizer,
+    optimizer: Adam,
+    /// All parameters as one vector, where they are not on the processor; nothing before the first step.
+    flat: Option<Tensor<1>>,
     clip_norm: f32,
 }
 
@@ -62,8 +68,8 @@ pub struct Learner<M> {
 pub struct Stepped<M, L> {
     /// The learner after it.
     pub learner: Learner<M>,
-    /// What was lost on each group.
-    pub losses: Vec<L>,
+    /// What was lost.
+    pub losses: L,
     /// Whether the gradient was no number and was left out: the parameters follow earlier ones alone.
     pub dropped: bool,
 }
@@ -71,7 +77,7 @@ pub struct Stepped<M, L> {
 impl<M: Module + Sync> Learner<M> {
     /// Begins with a module on a device with gradients.
     pub fn new(module: M, device: Device, clip_norm: f32) -> Self {
-        Self { module, device, optimizer: AdamConfig::new().with_epsilon(1e-8).init(), clip_norm }
+        Self { module, device, optimizer: Adam::default(), flat: None, clip_norm }
     }
 
     /// The module as it is now.
@@ -79,10 +85,15 @@ impl<M: Module + Sync> Learner<M> {
         &self.module
     }
 
+    /// Whether it learns on the processor, where groups run side by side.
+    pub(super) fn is_on_processor(&self) -> bool {
+        is_processor(&self.device)
+    }
+
     /// The same with other parameters.
     #[must_use]
     pub fn with_module(self, module: M) -> Self {
-        Self { module, ..self }
+        Self { module, flat: None, ..self }
     }
 
     /// The module alone, when there is nothing more to learn.
@@ -90,27 +101,28 @@ impl<M: Module + Sync> Learner<M> {
         self.module
     }
 
-    /// The optimizer's moments, to go on with later.
+    /// The optimizer's moments, to go on with later, anywhere.
     ///
     /// # Errors
     ///
-    /// When they cannot be written in burn's format.
-    pub fn optimizer_bytes(&self) -> Result<Bytes, String> {
-        self.optimizer.into_bytes().map_err(|error| error.to_string())
+    /// When they cannot be read or written; `path` is for the message alone.
+    pub(super) fn optimizer_bytes(&self, path: &Path) -> Result<Vec<u8>, ModelError> {
+        self.optimizer.to_bytes(self.module.num_params(), path)
     }
 
     /// Goes on with saved moments.
     ///
     /// # Errors
     ///
-    /// When the bytes are no optimizer's.
-    pub fn with_optimizer(self, bytes: Vec<u8>) -> Result<Self, String> {
-        let optimizer = self.optimizer.from_bytes(Bytes::from_bytes_vec(bytes)).map_err(|error| error.to_string())?;
+    /// When the bytes are no moments of this module; `path` is for the message alone.
+    pub(super) fn with_optimizer(self, bytes: Vec<u8>, path: &Path) -> Result<Self, ModelError> {
+        let device = self.device.clone().without_autodiff();
+        let optimizer = Adam::from_bytes(bytes, self.module.num_params(), &device, path)?;
         Ok(Self { optimizer, ..self })
     }
 
-    /// Learns from groups. `lose` says what a module loses on a group, and what is to be differentiated; the former comes
-    /// back in the groups' order.
+    /// Learns from groups, on the processor. `lose` says what a module loses on a group, and what is to be
+    /// differentiated; the former comes back in the groups' order.
     ///
     /// # Errors
     ///
@@ -120,7 +132,7 @@ impl<M: Module + Sync> Learner<M> {
         groups: &[G],
         learning_rate: f64,
         lose: impl Fn(&M, &G) -> Result<(L, Option<Tensor<1>>), E> + Sync,
-    ) -> Result<Stepped<M, L>, E> {
+    ) -> Result<Stepped<M, Vec<L>>, E> {
         let copies: Vec<(M, &G)> = groups.iter().map(|group| (self.module.clone().fork(&self.device), group)).collect();
         let results: Vec<Result<(L, Vec<f32>), E>> = copies
             .par_iter()
@@ -135,11 +147,55 @@ impl<M: Module + Sync> Learner<M> {
             sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
         }
         let dropped = !clip(&mut sum, self.clip_norm);
-        let gradients = from_flat(&self.module, &sum);
-        let Self { module, device, mut optimizer, clip_norm } = self;
-        let module = optimizer.step(learning_rate, module, gradients);
-        let learner = Self { module, device, optimizer, clip_norm };
+        let Self { module, device, mut optimizer, flat, clip_norm } = self;
+        let (n, host) = (sum.len(), device.clone().without_autodiff());
+        let gradient = Tensor::from_data(TensorData::new(sum, [n]), &host);
+        let parameters = Tensor::from_data(TensorData::new(host_parameters(&module)?, [n]), &host);
+        let parameters = optimizer.step(learning_rate, parameters, gradient);
+        let module = module.map(&mut FromHost { values: &values(parameters)? });
+        let learner = Self { module, device, optimizer, flat, clip_norm };
         Ok(Stepped { learner, losses: results.into_iter().map(|(losses, _)| losses).collect(), dropped })
+    }
+
+    /// Learns from everything at once, on an accelerator: gradients and parameters stay there. `lose` says what is to be
+    /// told, and what is to be differentiated; `told` makes losses of the numbers, before anything is learned.
+    ///
+    /// # Errors
+    ///
+    /// When nothing can be learned; nothing is learned then.
+    pub(super) fn step_at_once<L, E: From<TensorError>>(
+        self,
+        learning_rate: f64,
+        lose: impl FnOnce(&M) -> Result<(Tensor<1>, Tensor<1>), E>,
+        told: impl FnOnce(&[f32]) -> Result<L, E>,
+    ) -> Result<Stepped<M, L>, E> {
+        let (telling, total) = lose(&self.module)?;
+        let gradients = GradientsParams::from_grads(total.backward(), &self.module);
+        let mut parts =
+            Gradients { gradients: &gradients, device: self.device.clone().without_autodiff(), flat: vec![] };
+        self.module.visit(&mut parts);
+        let gradient = Tensor::cat(parts.flat, 0);
+        let norm = gradient.clone().square().sum().sqrt();
+        // The one stop of a step.
+        let read = values(Tensor::cat(vec![norm, telling.inner()], 0))?;
+        let (norm, read) = read.split_first().map_or((f32::NAN, &read[..]), |(norm, read)| (*norm, read));
+        let losses = told(read)?;
+        let dropped = !norm.is_finite();
+        let gradient = match scale_to(norm, self.clip_norm) {
+            _ if dropped => gradient.zeros_like(),
+            Some(scale) => gradient.mul_scalar(scale),
+            None => gradient,
+        };
+        let Self { module, device, mut optimizer, flat, clip_norm } = self;
+        let parameters = flat.unwrap_or_else(|| {
+            let mut parts = Parameters(Vec::new());
+            module.visit(&mut parts);
+            Tensor::cat(parts.0, 0)
+        });
+        let parameters = optimizer.step(learning_rate, parameters, gradient);
+        let module = module.map(&mut FromFlat { flat: parameters.clone(), begin: 0 });
+        let learner = Self { module, device, optimizer, flat: Some(parameters), clip_norm };
+        Ok(Stepped { learner, losses, dropped })
     }
 }
 
@@ -182,11 +238,15 @@ fn clip(gradient: &mut [f32], largest_norm: f32) -> bool {
         gradient.fill(0.0);
         return false;
     }
-    let scale = (largest_norm / norm.max(f32::MIN_POSITIVE)).min(1.0);
-    if scale < 1.0 {
+    if let Some(scale) = scale_to(norm, largest_norm) {
         gradient.iter_mut().for_each(|value| *value *= scale);
     }
     true
+}
+
+/// What scales a gradient of a norm down to the largest; nothing where it is not larger.
+fn scale_to(norm: f32, largest_norm: f32) -> Option<f32> {
+    Some(largest_norm / norm.max(f32::MIN_POSITIVE)).filter(|scale| *scale < 1.0)
 }
 
 /// Losses of a part, and the weighed sum to differentiate. `percepts` are those of its group's pictures.
@@ -204,13 +264,13 @@ pub fn losses<N: Network>(
     let n_batch = part.ends.len();
     let demonstration = network.demonstration(&part.windows, percepts)?;
     let reading = network.read(&demonstration, &part.states, percepts, &part.called_with)?;
-    let (core, _) = network.core(&reading, part.program, &part.steps, None);
+    let (core, _) = network.core(&reading, part.program.into(), &part.steps, None);
     let programs = TensorData::new(part.programs.clone(), core.programs.dims());
     let program = cross_entropy(core.programs.clone(), Tensor::from_data(programs, &device));
     let ends = Tensor::from_data(TensorData::new(part.ends.clone(), [n_batch, 1]), &device);
     let end = binary_cross_entropy(core.end.clone(), ends).mul_scalar(part.weight);
     let mut total = program.clone().mul_scalar(weights.program) + end.clone().mul_scalar(weights.end);
-    let labels = part.scopes.as_ref().and_then(|_| network.scope(&reading, part.program, &core));
+    let labels = part.scopes.as_ref().and_then(|_| network.scope(&reading, part.program.into(), &core));
     let scope = part.scopes.as_ref().zip(labels).map(|(targets, labels)| {
         let shape = [n_batch, part.windows.n_frames(), ScopingLabel::ALL.len()];
         let targets = Tensor::<3>::from_data(TensorData::new(targets.clone(), shape), &device);
@@ -219,7 +279,7 @@ pub fn losses<N: Network>(
     let argument = part.arguments.as_ref().map(|targets| {
         let targets =
             TensorData::new(targets.clone(), [n_batch * network.scoping().n_arguments(), part.windows.n_slots()]);
-        cross_entropy(network.argument(&reading, part.program, &core), Tensor::from_data(targets, &device))
+        cross_entropy(network.argument(&reading, part.program.into(), &core), Tensor::from_data(targets, &device))
     });
     let weighed = [(&scope, weights.scope), (&argument, weights.argument)];
     for (loss, weight) in weighed.into_iter().filter_map(|(loss, weight)| Some((loss.clone()?, weight))) {
@@ -263,25 +323,74 @@ impl ModuleVisitor for Flattener<'_> {
     }
 }
 
-/// The other way round.
-struct Unflattener<'g> {
-    flat: &'g [f32],
-    gradients: GradientsParams,
+/// The parameters on the processor, one after another.
+fn host_parameters<M: Module>(module: &M) -> Result<Vec<f32>, TensorError> {
+    let mut parts = Parameters(Vec::new());
+    module.visit(&mut parts);
+    let read: Vec<Vec<f32>> = parts.0.into_iter().map(values).collect::<Result<_, _>>()?;
+    Ok(read.concat())
 }
 
-impl ModuleVisitor for Unflattener<'_> {
+/// Each parameter as a vector without gradients.
+struct Parameters(Vec<Tensor<1>>);
+
+impl ModuleVisitor for Parameters {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let (gradient, rest) = self.flat.split_at(param.shape().num_elements());
-        self.flat = rest;
-        let data = TensorData::new(gradient.to_vec(), param.shape());
-        self.gradients.register(param.id, Tensor::<D>::from_data(data, &param.device().inner()));
+        let n = param.shape().num_elements();
+        self.0.push(param.val().inner().reshape([n]));
     }
 }
 
-fn from_flat<N: Module>(network: &N, flat: &[f32]) -> GradientsParams {
-    let mut unflattener = Unflattener { flat, gradients: GradientsParams::new() };
-    network.visit(&mut unflattener);
-    unflattener.gradients
+/// Each parameter's gradient as a vector; zeros for one that took no part.
+struct Gradients<'g> {
+    gradients: &'g GradientsParams,
+    device: Device,
+    flat: Vec<Tensor<1>>,
+}
+
+impl ModuleVisitor for Gradients<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let n = param.shape().num_elements();
+        let gradient = self.gradients.get::<D>(param.id).map(|gradient| gradient.reshape([n]));
+        self.flat.push(gradient.unwrap_or_else(|| Tensor::zeros([n], &self.device)));
+    }
+}
+
+/// Gives parameters their values on the processor.
+struct FromHost<'v> {
+    values: &'v [f32],
+}
+
+impl ModuleMapper for FromHost<'_> {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let (values, rest) = self.values.split_at(param.shape().num_elements());
+        self.values = rest;
+        let data = TensorData::new(values.to_vec(), param.shape());
+        with_value(param, |device| Tensor::from_data(data, device))
+    }
+}
+
+/// Gives parameters their parts of a vector.
+struct FromFlat {
+    flat: Tensor<1>,
+    begin: usize,
+}
+
+impl ModuleMapper for FromFlat {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let shape = param.shape();
+        let part = self.flat.clone().narrow(0, self.begin, shape.num_elements());
+        self.begin += shape.num_elements();
+        with_value(param, |_device| part.reshape(shape))
+    }
+}
+
+/// The same parameter with another value, which has no gradients; it requires one if it did before.
+fn with_value<const D: usize>(param: Param<Tensor<D>>, value: impl FnOnce(&Device) -> Tensor<D>) -> Param<Tensor<D>> {
+    param.map(|before| {
+        let after = Tensor::from_inner(value(&before.device().without_autodiff()));
+        if before.is_require_grad() { after.require_grad() } else { after }
+    })
 }
 
 #[cfg(test)]

@@ -43,6 +43,19 @@ pub trait Gallery: Sync {
     }
 }
 
+/// Who finds the pictures of trials as they come into memory.
+pub trait Galleries: Sync {
+    /// Pixels across and down each picture.
+    fn size(&self) -> (usize, usize);
+
+    /// The pictures of these trials.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`] when they cannot be found.
+    fn open(&self, trials: &DatasetTrials) -> Result<Box<dyn Gallery>, TrainError>;
+}
+
 /// The trials that a step with this seed looks at, each once, and most of their frames.
 pub(super) fn wanted(examples: &Examples<'_>, seed: Seed) -> Vec<Wanted> {
     let groups = (0..GROUPS).flat_map(|group| draw_pairs(examples, &mut group_seed(seed, group).rng()));

@@ -10,9 +10,13 @@ use std::process::Command;
 
 use burn::tensor::Device;
 use cpu_time::ProcessTime;
-use ntp::dataset::{ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, convert, read_trials};
+use ntp::dataset::{
+    ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, TrialData, TrialSpool, convert, read_trials,
+};
 use ntp::expert::demonstrate;
-use ntp::model::{Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant};
+use ntp::model::{
+    ComputeDevice, Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant,
+};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
 use ntp::rollout::{Limits, Start, load_policy, run};
@@ -20,7 +24,7 @@ use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
 use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
-use ntp::training::{Hooks, TrainConfig, Training, train};
+use ntp::training::{Hooks, Source, TrainConfig, Training, TrialStream, train, train_from};
 
 /// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
 fn load(dataset: &Path) -> usize {
@@ -32,6 +36,12 @@ fn load(dataset: &Path) -> usize {
 
 /// Runs the convert stage alone, in a process of its own, and prints its peak memory.
 const CONVERT_CHILD: &str = "--convert-child";
+/// Trains from trials on disk, in a process of its own.
+const STREAM_CHILD: &str = "--stream-child";
+/// Frames of these: what is streamed from is never so small.
+const STREAMED_FRAMES: usize = 10_000_000;
+/// Steps of a training in which the buffer is turned four times.
+const STREAMED_STEPS: u32 = 1000;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
@@ -40,6 +50,12 @@ fn main() {
     {
         convert_all(Path::new(recordings), Path::new(out));
         println!("{}", peak_mb());
+        return;
+    }
+    if let [mode, dataset] = arguments.as_slice()
+        && mode == STREAM_CHILD
+    {
+        train_streamed(Path::new(dataset));
         return;
     }
     let wanted = |name: &str| arguments.is_empty() || arguments.iter().any(|argument| argument == name);
@@ -58,7 +74,8 @@ fn main() {
         bench.generate_sorting_40();
     }
     let of_policies = ["train_samples", "policy_step_us", "rollout_stacking"];
-    let of_dataset = [&["convert_rows", "convert_peak_mb", "train_samples_paper"][..], &of_policies].concat();
+    let of_dataset =
+        [&["convert_rows", "convert_peak_mb", "train_samples_paper", "train_streamed"][..], &of_policies].concat();
     let is_dataset_wanted = of_dataset.into_iter().any(wanted);
     if is_dataset_wanted || wanted("generate_stacking") {
         bench.generate_stacking();
@@ -72,6 +89,11 @@ fn main() {
     }
     if wanted("train_samples_paper") {
         bench.train_samples("train_samples_paper", Variant::NTP_PAPER, &trials);
+    }
+    if wanted("train_streamed") {
+        let secs = train_steps(Source::Here(&trials, None), &bench.folder.join("here"));
+        report("train_unstreamed", secs, "decisions per CPU-second");
+        bench.train_streamed();
     }
     if of_policies.into_iter().any(wanted) {
         bench.train_samples("train_samples", Variant::NTP, &trials);
@@ -88,6 +110,38 @@ fn cpu_secs<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = ProcessTime::now();
     let value = work();
     (value, start.elapsed().as_secs_f64())
+}
+
+/// Copies the trials of a dataset under other tasks' names until there are enough, and learns from them on disk.
+fn train_streamed(dataset: &Path) {
+    let trials = read_trials(dataset).expect("the dataset can be read");
+    let (n_slots, mut n_frames) = (trials.n_slots, 0);
+    let copies = (0..).flat_map(|copy: usize| {
+        let renamed =
+            move |trial: &TrialData| TrialData { task_id: format!("{}/{copy}", trial.task_id), ..trial.clone() };
+        trials.trials.iter().map(renamed)
+    });
+    let enough = copies.take_while(|trial| {
+        n_frames += trial.n_frames;
+        n_frames < STREAMED_FRAMES
+    });
+    let folder = tempfile::tempdir_in(dataset.parent().expect("a folder")).expect("a temporary folder can be made");
+    let spool = TrialSpool::of(folder.path(), n_slots, enough).expect("trials can be written");
+    let (stream, secs) = cpu_secs(|| TrialStream::new(spool, 1_500_000).expect("trials can be read"));
+    report("train_streamed_trials", stream.n_trials() as f64, "trials");
+    report("train_streamed_first_pass", STREAMED_FRAMES as f64 / secs, "frames per CPU-second");
+    let rate = train_steps(Source::Streamed(&stream, None), folder.path());
+    report("train_streamed", rate, "decisions per CPU-second");
+    report("train_streamed_peak_mb", peak_mb(), "MB");
+}
+
+/// Decisions learned from in a CPU-second.
+fn train_steps(source: Source<'_>, folder: &Path) -> f64 {
+    let config = TrainConfig { steps: Some(STREAMED_STEPS), checkpoint_every: 10_000, ..TrainConfig::default() };
+    let training = Training { variant: Variant::NTP, specification: SpecificationForm::default(), seed: 0, config };
+    let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
+    let (summary, secs) = cpu_secs(|| train_from(ComputeDevice::Cpu, &training, source, folder, &mut hooks));
+    summary.expect("training goes well").examples as f64 / secs
 }
 
 /// The paper's seven convolutions there and back over 32 pictures of 64 pixels, as `tests/bench/peers/pytorch_convolutions.py` does in
@@ -255,6 +309,13 @@ impl Bench {
         let text = String::from_utf8_lossy(&output.stdout);
         let peak = text.trim().parse().unwrap_or(f64::NAN);
         report("convert_peak_mb", peak, "MB");
+    }
+
+    fn train_streamed(&self) {
+        let status = Command::new(std::env::current_exe().expect("the bench knows itself"))
+            .args([STREAM_CHILD.as_ref(), self.folder.join("dataset").as_os_str()])
+            .status();
+        assert!(status.is_ok_and(|status| status.success()), "the child failed");
     }
 
     /// Decisions learned from in training, batch building included.

@@ -196,8 +196,8 @@ impl NetworkUse for Decided<'_> {
         let reading = network.read(&demonstration, &now, &percepts, &[CalledWith::default()]).unwrap();
         let beyond = network.read(&demonstration, &States::Pictures(vec![PictureIndex(3)]), &percepts, &[]);
         assert_eq!(beyond.err(), Some(ReadError::Picture { found: 3, n: 3 }));
-        let (core, _) = network.core(&reading, Program::BlockStacking, &[1], None);
-        let argument = network.argument(&reading, Program::BlockStacking, &core);
+        let (core, _) = network.core(&reading, Program::BlockStacking.into(), &[1], None);
+        let argument = network.argument(&reading, Program::BlockStacking.into(), &core);
         let values =
             [core.programs, core.end, argument].map(|logits| logits.into_data().try_into_vec::<f32>().unwrap());
         values.concat()

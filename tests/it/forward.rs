@@ -63,13 +63,13 @@ impl NetworkUse for Saying {
         let demonstration = network.demonstration(&Windows::new(1, &[&windows]).unwrap(), &percepts).unwrap();
         let state = States::Observations(row());
         let reading = network.read(&demonstration, &state, &percepts, &[CalledWith::default()]).unwrap();
-        let (core, _) = network.core(&reading, Program::Pick, &[1], None);
+        let (core, _) = network.core(&reading, Program::Pick.into(), &[1], None);
         Said {
             hidden: alike(core.hidden.clone()),
             end: alike(core.end.clone()),
             program: alike(core.programs.clone()),
-            label: network.scope(&reading, Program::Pick, &core).map(alike),
-            slot: alike(network.argument(&reading, Program::Pick, &core)),
+            label: network.scope(&reading, Program::Pick.into(), &core).map(alike),
+            slot: alike(network.argument(&reading, Program::Pick.into(), &core)),
         }
     }
 }

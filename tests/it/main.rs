@@ -23,6 +23,8 @@ mod dataset_pictures;
 #[cfg(test)]
 mod detecting;
 #[cfg(test)]
+mod device;
+#[cfg(test)]
 mod documents;
 #[cfg(test)]
 mod expert;

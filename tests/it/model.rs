@@ -93,12 +93,12 @@ fn say(network: &impl Network, n_slots: usize, shown: &[&[f32]], states: &[f32],
             &vec![CalledWith::default(); shown.len()],
         )
         .unwrap();
-    let (core, _) = network.core(&reading, program, &[shown.len()], None);
+    let (core, _) = network.core(&reading, program.into(), &[shown.len()], None);
     Said {
         programs: values(core.programs.clone()),
         ends: values(core.end.clone()),
-        scopes: network.scope(&reading, program, &core).map(values).unwrap_or_default(),
-        arguments: values(network.argument(&reading, program, &core)),
+        scopes: network.scope(&reading, program.into(), &core).map(values).unwrap_or_default(),
+        arguments: values(network.argument(&reading, program.into(), &core)),
     }
 }
 
@@ -229,7 +229,7 @@ impl NetworkUse for Packing {
                 &[CalledWith::default(); 4],
             )
             .unwrap();
-        let (packed, _) = network.core(&reading, Program::Pick, &[2, 1, 1], None);
+        let (packed, _) = network.core(&reading, Program::Pick.into(), &[2, 1, 1], None);
         let packed = values(packed.programs);
         let mut recall = None;
         let mut alone = Vec::new();
@@ -245,7 +245,7 @@ impl NetworkUse for Packing {
                     &[CalledWith::default()],
                 )
                 .unwrap();
-            let (core, remembered) = network.core(&reading, Program::Pick, &[1], recall.take());
+            let (core, remembered) = network.core(&reading, Program::Pick.into(), &[1], recall.take());
             recall = Some(remembered);
             let programs = values(core.programs);
             assert_near(&programs, &packed[step * programs.len()..][..programs.len()]);
@@ -262,7 +262,7 @@ impl NetworkUse for Packing {
                     &[CalledWith::default()],
                 )
                 .unwrap(),
-            Program::Pick,
+            Program::Pick.into(),
             &[1],
             None,
         );
@@ -296,8 +296,8 @@ impl NetworkUse for Told {
                     std::slice::from_ref(given),
                 )
                 .unwrap();
-            let (core, _) = network.core(&reading, Program::Pick, &[1], None);
-            let arguments = values(network.argument(&reading, Program::Pick, &core));
+            let (core, _) = network.core(&reading, Program::Pick.into(), &[1], None);
+            let arguments = values(network.argument(&reading, Program::Pick.into(), &core));
             assert_eq!(arguments.len(), 8 * network.scoping().n_arguments());
             values(core.programs)
         };
@@ -372,13 +372,13 @@ fn follow(demonstration: &Sentences, states: &[f32]) -> Said {
             &[CalledWith::default()],
         )
         .unwrap();
-    let (core, _) = network.core(&reading, Program::Pick, &[1], None);
-    let scopes = network.scope(&reading, Program::Pick, &core).map(values).unwrap_or_default();
+    let (core, _) = network.core(&reading, Program::Pick.into(), &[1], None);
+    let scopes = network.scope(&reading, Program::Pick.into(), &core).map(values).unwrap_or_default();
     Said {
         programs: values(core.programs.clone()),
         ends: values(core.end.clone()),
         scopes: scopes[..8].to_vec(),
-        arguments: values(network.argument(&reading, Program::Pick, &core)),
+        arguments: values(network.argument(&reading, Program::Pick.into(), &core)),
     }
 }
 
@@ -413,15 +413,15 @@ fn padding_of_instructions_changes_nothing_within_a_window() {
             &[CalledWith::default(); 2],
         )
         .unwrap();
-    let (core, _) = network.core(&reading, Program::Pick, &[2], None);
-    let scopes = network.scope(&reading, Program::Pick, &core).map(values).unwrap();
+    let (core, _) = network.core(&reading, Program::Pick.into(), &[2], None);
+    let scopes = network.scope(&reading, Program::Pick.into(), &core).map(values).unwrap();
     let alone = follow(
         &network.demonstration(&sentence_windows(&[&short]), &network.perceive(&Pictures::default()).unwrap()).unwrap(),
         &states[..11],
     );
     assert_near(&values(core.end.clone())[..1], &alone.ends);
     assert_near(&scopes[..8], &alone.scopes);
-    assert_near(&values(network.argument(&reading, Program::Pick, &core))[..3], &alone.arguments);
+    assert_near(&values(network.argument(&reading, Program::Pick.into(), &core))[..3], &alone.arguments);
 }
 
 #[test]
@@ -445,8 +445,8 @@ fn a_cut_demonstration_reads_as_its_part_alone() {
             &[CalledWith::default()],
         )
         .unwrap();
-    let (core, _) = network.core(&reading, Program::PickAndPlace, &[1], None);
-    let cut = values(network.scope(&reading, Program::PickAndPlace, &core).unwrap());
+    let (core, _) = network.core(&reading, Program::PickAndPlace.into(), &[1], None);
+    let cut = values(network.scope(&reading, Program::PickAndPlace.into(), &core).unwrap());
     let alone = say(&network, 8, &[&all[2 * 26..6 * 26]], &state, Program::PickAndPlace);
     assert_near(&cut, &alone.scopes);
 }

@@ -3,8 +3,10 @@
 use std::cell::Cell;
 use std::path::Path;
 
-use ntp::dataset::{DatasetTrials, TrialData};
-use ntp::model::{CONFIG_FILE, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE};
+use ntp::dataset::{DatasetTrials, TrialData, TrialSpool};
+use ntp::model::{
+    CONFIG_FILE, ComputeDevice, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE,
+};
 use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
@@ -12,8 +14,8 @@ use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, Provenance, Span, SpecificationForm, Vocabulary, instructions};
 use ntp::training::{
-    Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, TrainConfig, TrainError,
-    TrainSummary, Training, draw, train,
+    Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, Source, TrainConfig,
+    TrainError, TrainSummary, Training, TrialStream, draw, train, train_from,
 };
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
@@ -333,6 +335,59 @@ fn forty_steps_are_twenty_and_twenty_more() {
     }
 }
 
+/// Towers of two blocks, each a task of its own, with two trials: more shards than a buffer holds.
+fn many_towers() -> DatasetTrials {
+    let pairs =
+        (0..8_u16).flat_map(|lower| (0..8).filter(move |upper| *upper != lower).map(move |upper| [lower, upper]));
+    let tasks: Vec<Task> =
+        pairs.step_by(3).enumerate().map(|(n, pair)| tower(&format!("t{n:02}"), &pair, Split::Seen)).collect();
+    demonstrations(&tasks, 2)
+}
+
+#[test]
+fn trials_on_disk_are_read_back_as_they_were_written() {
+    let (data, folder) = (many_towers(), tempfile::tempdir().unwrap());
+    let spool = TrialSpool::of(folder.path(), data.n_slots, &data.trials).unwrap();
+    assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "the file has no name");
+    assert_eq!(spool.read(0..spool.len()).unwrap(), data.trials);
+    assert_eq!(spool.read(7..9).unwrap(), data.trials[7..9]);
+    assert_eq!(spool.read(3..3).unwrap(), []);
+}
+
+#[test]
+fn a_training_streamed_from_disk_gives_the_same_bytes_when_it_is_resumed_and_not_those_of_memory() {
+    let data = many_towers();
+    for variant in [Variant::NTP, Variant::NPI] {
+        let config = TrainConfig { steps: Some(210), batch: 4, ..TrainConfig::default() };
+        let training = Training { variant, ..ntp(config) };
+        let train_from_disk = |folder: &Path, stop: Option<u32>| {
+            let spool = TrialSpool::of(folder, data.n_slots, &data.trials).unwrap();
+            let stream = TrialStream::new(spool, 160).unwrap();
+            let done = Cell::new(0);
+            let mut on_progress = |progress: ntp::training::Progress| done.set(progress.step);
+            let should_stop = || stop.is_some_and(|stop| done.get() >= stop);
+            let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &should_stop };
+            train_from(ComputeDevice::Cpu, &training, Source::Streamed(&stream, None), folder, &mut hooks)
+        };
+        let [straight, resumed] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let whole = train_from_disk(straight.path(), None).unwrap();
+        // The buffer has been turned once.
+        train_from_disk(resumed.path(), Some(204)).unwrap_err();
+        assert_eq!(train_from_disk(resumed.path(), None).unwrap().resumed_at, 204);
+        let read = |folder: &Path, file: &str| std::fs::read(folder.join(file)).unwrap();
+        for file in [WEIGHTS_FILE, CONFIG_FILE, METRICS_FILE] {
+            assert!(read(straight.path(), file) == read(resumed.path(), file), "{variant}: {file} differs");
+        }
+        assert_ne!(read(straight.path(), WEIGHTS_FILE), weights(&training, &data));
+        let loss = |step: u32| -> f32 {
+            whole.metrics.iter().filter(|metric| metric.step == step).map(|metric| metric.loss_total).sum()
+        };
+        assert!(loss(210) < 0.7 * loss(10), "{variant}: {} and {}", loss(10), loss(210));
+        let config: ModelConfig = ntp::artifact::read_json(&straight.path().join(CONFIG_FILE)).unwrap();
+        assert_eq!(config.tasks.len(), if variant == Variant::NPI { 19 } else { 0 });
+    }
+}
+
 #[test]
 fn a_checkpoint_of_another_training_is_not_taken_and_a_broken_one_is_named() {
     let data = towers();
@@ -340,7 +395,7 @@ fn a_checkpoint_of_another_training_is_not_taken_and_a_broken_one_is_named() {
     let config = ntp(TrainConfig { batch: 8, ..short() });
     train_until(&config, &data, folder.path(), Some(3)).unwrap_err();
     let other = Training { seed: 9, ..config.clone() };
-    let file = folder.path().join("checkpoint/step-00000003.adam");
+    let file = folder.path().join("checkpoint/step-00000003.moments.safetensors");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
     let error = train_until(&config, &data, folder.path(), None).unwrap_err();

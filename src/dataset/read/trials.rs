@@ -9,6 +9,7 @@ use std::path::Path;
 
 use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::layout;
+use crate::dataset::read::trial_spool::{SpoolWriter, TrialSpool};
 use crate::dataset::tables::calls::check::check_tree;
 use crate::dataset::tables::calls::read::{read_calls, read_instructions};
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
@@ -27,13 +28,71 @@ use crate::trace::{ProgramCall, Span};
 /// See the module. An episode that a policy acted is refused: the spans of its calls speak of a demonstration that is
 /// not in the dataset.
 pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
+    let mut trials = Vec::new();
+    let n_slots = visit_trials(root, |trial| {
+        trials.push(trial);
+        Ok(())
+    })?;
+    Ok(DatasetTrials { n_slots, trials })
+}
+
+/// The trials that a learner takes: in memory, or on disk where there are too many.
+#[derive(Debug)]
+pub enum LearnedTrials {
+    /// All of them.
+    Here(DatasetTrials),
+    /// In a file.
+    OnDisk(TrialSpool),
+}
+
+/// Reads the episodes that a learner takes, as [`read_trials`] does. When they have more than `most_frames` boundary frames
+/// they go into a file without a name in `folder`.
+///
+/// # Errors
+///
+/// As [`read_trials`], and when that file cannot be written.
+pub fn read_learned_trials(
+    root: &Path,
+    is_taken: impl Fn(&TrialData) -> bool,
+    most_frames: u64,
+    folder: &Path,
+) -> Result<LearnedTrials, DatasetError> {
+    let mut here: Vec<TrialData> = Vec::new();
+    let mut n_frames = 0;
+    let mut spool: Option<SpoolWriter> = None;
+    let n_slots = visit_trials(root, |trial| {
+        if !is_taken(&trial) {
+            return Ok(());
+        }
+        n_frames += trial.n_frames as u64;
+        if spool.is_none() && n_frames > most_frames {
+            let mut writer = SpoolWriter::new(folder)?;
+            std::mem::take(&mut here).iter().try_for_each(|trial| writer.push(trial))?;
+            spool = Some(writer);
+        }
+        match &mut spool {
+            Some(spool) => spool.push(&trial)?,
+            None => here.push(trial),
+        }
+        Ok(())
+    })?;
+    Ok(match spool {
+        Some(spool) => LearnedTrials::OnDisk(spool.finish(n_slots)?),
+        None => LearnedTrials::Here(DatasetTrials { n_slots, trials: here }),
+    })
+}
+
+/// Reads the successful episodes one after another; tells how many slots each has.
+fn visit_trials(
+    root: &Path,
+    mut visit: impl FnMut(TrialData) -> Result<(), DatasetError>,
+) -> Result<usize, DatasetError> {
     let (info, mut rows) = EpisodeRows::open(root)?;
     let n_slots = n_slots(root, &info)?;
     let width = crate::trace::Observation::width(n_slots);
     let mut frame_cursor = Cursor::new(root, layout::DATA);
     let mut call_cursor = Cursor::new(root, layout::CALLS);
     let mut instruction_cursor = Cursor::new(root, layout::CALLS);
-    let mut trials = Vec::new();
     let mut calls = Vec::new();
     while let Some(row) = rows.next() {
         let row = row?;
@@ -51,13 +110,13 @@ pub fn read_trials(root: &Path) -> Result<DatasetTrials, DatasetError> {
                 problem,
             })?;
             let trial = trial(&row, frames, &calls, width).map_err(of_episode)?;
-            trials.push(TrialData { instructions, ..trial });
+            visit(TrialData { instructions, ..trial })?;
         }
     }
     frame_cursor.finish()?;
     call_cursor.finish()?;
     instruction_cursor.finish()?;
-    Ok(DatasetTrials { n_slots, trials })
+    Ok(n_slots)
 }
 
 fn check_is_demonstration(row: &EpisodeRow) -> Result<(), String> {
