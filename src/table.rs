@@ -33,7 +33,7 @@ mod values;
 mod words;
 mod write;
 
-pub(crate) use arrays::TextRows;
+pub(crate) use arrays::{TextRows, count_flags};
 pub(crate) use batches::{BatchReader, BatchWriter};
 pub use column::{Column, Columns};
 pub(crate) use declare::{Batch, DeclaredColumn, TableRows, batch, column_name, table};

@@ -25,6 +25,7 @@ pub use boundaries::{Boundaries, RecordedFrames};
 pub use call::{CallId, Prediction, ProgramCall};
 pub use episode::{Actor, Episode, EpisodeParts, Provenance};
 pub use frame::{Frame, GripperState, Observation};
+pub(crate) use instruction::is_sentence;
 pub use instruction::{
     Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
 };

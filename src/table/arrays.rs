@@ -5,6 +5,7 @@ use std::ops::Range;
 use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array, StringArray};
 use arrow::buffer::{BooleanBuffer, OffsetBuffer, ScalarBuffer};
 use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
+use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
 
 use crate::table::{Column, ColumnKind, Columns, Form, TableError, Value};
 
@@ -61,6 +62,11 @@ impl TextRows {
     pub(crate) fn get(&self, at: usize) -> Option<&str> {
         self.0.is_valid(at).then(|| self.0.value(at))
     }
+}
+
+/// How many rows of a range are flagged.
+pub(crate) fn count_flags(flags: &BooleanBuffer, range: &Range<usize>) -> usize {
+    UnalignedBitChunk::new(flags.values(), flags.offset() + range.start, range.len()).count_ones()
 }
 
 /// Columns of a batch without a copy. The errors are those of the other takers.

@@ -74,11 +74,34 @@ impl Vocabulary {
 
 /// The sentence for a call of `calls` that calls a `move_to` itself; nothing for any other. `name` names its argument.
 pub fn sentence<'n>(calls: &[ProgramCall], position: usize, name: impl Fn(usize) -> &'n str) -> Option<String> {
+    let (verb, slot) = words_of(calls, position)?;
+    Some(format!("{} {}", verb.join(" "), name(slot)))
+}
+
+/// Whether `said` is the [`sentence`] for a call, without making one.
+pub(crate) fn is_sentence<'n>(
+    said: Option<&str>,
+    calls: &[ProgramCall],
+    position: usize,
+    name: impl Fn(usize) -> &'n str,
+) -> bool {
+    match (said, words_of(calls, position)) {
+        (None, None) => true,
+        (Some(said), Some((verb, slot))) => {
+            let rest = verb.iter().try_fold(said, |rest, word| rest.strip_prefix(word)?.strip_prefix(' '));
+            rest == Some(name(slot))
+        }
+        _ => false,
+    }
+}
+
+/// The words for what a call does, and the slot that it does it to.
+fn words_of(calls: &[ProgramCall], position: usize) -> Option<(&'static [&'static str], usize)> {
     let call = calls.get(position)?;
     let (_, verb) = VERBS.iter().find(|(program, _)| *program == call.program)?;
     let below = calls[position + 1..].iter().take_while(|other| other.depth > call.depth);
     let slot = below.filter(|other| other.caller == Some(call.id)).find_map(|other| other.argument)?;
-    Some(format!("{} {}", verb.join(" "), name(usize::from(slot.0))))
+    Some((verb, usize::from(slot.0)))
 }
 
 /// What an episode's calls say in words.

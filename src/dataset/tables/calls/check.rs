@@ -6,7 +6,7 @@ use crate::dataset::files::finding::Validation;
 use crate::dataset::tables::calls;
 use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::table::batch;
-use crate::trace::{Cause, Outcome, ProgramCall, check_calls, sentence};
+use crate::trace::{Cause, Outcome, ProgramCall, check_calls, is_sentence, sentence};
 
 /// Holds the rules of the program tree.
 pub(crate) fn check_tree(row: &EpisodeRow, n_slots: usize, calls: &[ProgramCall]) -> Result<(), (u32, String)> {
@@ -45,21 +45,24 @@ pub(crate) fn check_arguments(
     validation: &mut Validation,
 ) -> Result<(), DatasetError> {
     let name = |slot: usize| row.slots.get(slot).map_or("", String::as_str);
-    for (position, call) in calls.iter().enumerate() {
-        let rows = cursor.next_rows(row.calls, 1)?;
-        let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
-        let at = rows.range.start;
-        let (found, said) = (rows.batch.argument.get(at), rows.batch.instruction.get(at));
-        let meant = sentence(calls, position, name);
-        if said != meant.as_deref() {
-            let message = format!("instruction is {said:?}, but the call is {meant:?}");
-            validation.error("calls.instruction", &rows.path(), place(), message);
+    let mut first = 0;
+    while first < calls.len() {
+        let rows = cursor.next_rows(row.calls, calls.len() - first)?;
+        for (at, position) in rows.range.clone().zip(first..) {
+            let call = &calls[position];
+            let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
+            let (found, said) = (rows.batch.argument.get(at), rows.batch.instruction.get(at));
+            if !is_sentence(said, calls, position, name) {
+                let message = format!("instruction is {said:?}, but the call is {:?}", sentence(calls, position, name));
+                validation.error("calls.instruction", &rows.path(), place(), message);
+            }
+            let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0))).map(String::as_str);
+            if found != expected {
+                let message = format!("argument is {found:?}, but its slot is named {expected:?}");
+                validation.error("calls.argument", &rows.path(), place(), message);
+            }
         }
-        let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0))).map(String::as_str);
-        if found != expected {
-            let message = format!("argument is {found:?}, but its slot is named {expected:?}");
-            validation.error("calls.argument", &rows.path(), place(), message);
-        }
+        first += rows.range.len();
     }
     Ok(())
 }

@@ -70,11 +70,12 @@ pub(crate) fn read_calls(
     calls: &mut Vec<ProgramCall>,
 ) -> Result<(), DatasetError> {
     calls.clear();
-    for _ in 0..row.n_calls {
-        let (batch, at) = cursor.next(row.calls)?;
-        match batch.call(at, row.episode_index) {
-            Ok(call) => calls.push(call),
-            Err(problem) => return Err(cursor.problem(problem)),
+    let n_calls = usize::try_from(row.n_calls).unwrap_or(0);
+    while calls.len() < n_calls {
+        let rows = cursor.next_rows(row.calls, n_calls - calls.len())?;
+        for at in rows.range.clone() {
+            let call = rows.batch.call(at, row.episode_index).map_err(|problem| rows.problem(at, problem))?;
+            calls.push(call);
         }
     }
     Ok(())

@@ -8,6 +8,7 @@ use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::dataset::tables::frames::expected::{Before, FullFrameBatch, Labels, step_problem};
 use crate::dataset::tables::frames::feature::{ACTION_NAMES, POSITION_NAMES};
 use crate::dataset::tables::texts::read::Texts;
+use crate::table::count_flags;
 
 const ACTION: usize = ACTION_NAMES.len();
 const POSITION: usize = POSITION_NAMES.len();
@@ -87,7 +88,7 @@ impl Run<'_> {
 
     /// Whether one row is flagged, or none, and no other.
     fn is_flagged(&self, flags: &BooleanBuffer, row: Option<usize>) -> bool {
-        let n_flags = flags.slice(self.range.start, self.range.len()).count_set_bits();
+        let n_flags = count_flags(flags, &self.range);
         n_flags == usize::from(row.is_some()) && row.is_none_or(|row| flags.value(row))
     }
 

@@ -12,7 +12,7 @@ use crate::dataset::files::cursor::{Cursor, Rows};
 use crate::dataset::files::finding::Validation;
 use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::dataset::tables::scopes;
-use crate::table::batch;
+use crate::table::{batch, count_flags};
 use crate::trace::Span;
 
 batch! {
@@ -114,7 +114,7 @@ impl Run {
 
     /// Whether one frame is flagged, if it is among the rows, and no other.
     fn has_flag(&self, flags: &BooleanBuffer, range: &Range<usize>, frame: u32) -> bool {
-        let n_flags = flags.slice(range.start, range.len()).count_set_bits();
+        let n_flags = count_flags(flags, range);
         if !self.frames.contains(&frame) {
             return n_flags == 0;
         }
