@@ -10,6 +10,7 @@ use std::process::Command;
 
 use burn::tensor::Device;
 use cpu_time::ProcessTime;
+use mimalloc::MiMalloc;
 use ntp::dataset::{
     ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, TrialData, TrialSpool, convert, read_trials,
 };
@@ -25,6 +26,10 @@ use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
 use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
 use ntp::training::{Hooks, Source, TrainConfig, Training, TrialStream, train, train_from};
+
+/// The program's.
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
 
 /// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
 fn load(dataset: &Path) -> usize {
