@@ -20,8 +20,10 @@ ROOT = HERE.parent.parent
 PAIRS = [
     ("MCAP to Parquet", "rows", "convert_rows", "pyarrow_rows", ["{run}/recordings", "{work}/rows_peer"], 20.0),
     ("dataset with pictures", "episodes", "convert_images_64", "lerobot_episodes", ["{work}/lerobot"], 200.0),
-    ("pictures of 64 pixels", "pictures", "render_64", "mujoco_pictures", ["64"], 10.0),
-    ("pictures of 224 pixels", "pictures", "render_224", "mujoco_pictures", ["224"], None),
+    ("64 pixels, colours, shadows, depths, segments", "pictures", "render_64", "mujoco_pictures", ["64", "all"], 10.0),
+    ("64 pixels, its colours alone", "pictures", "render_64", "mujoco_pictures", ["64", "colours"], None),
+    ("224 pixels, colours, shadows, depths, segments", "pictures", "render_224", "mujoco_pictures", ["224", "all"], None),
+    ("224 pixels, its colours alone", "pictures", "render_224", "mujoco_pictures", ["224", "colours"], None),
     ("training", "decisions", "train_samples_paper", "pytorch_samples", [], 3.0),
     ("seven convolutions", "pictures", "train_convolutions_64", "pytorch_convolutions", [], 1.2),
     ("query of 10 million rows", "queries", None, "duckdb_query", ["{ntp}", "{run}/dataset", "{work}/query"], 0.85),

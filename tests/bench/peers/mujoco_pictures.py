@@ -1,6 +1,7 @@
-"""Pictures of a table with eight blocks and a gripper by MuJoCo's renderer without a graphics card: SIZE
+"""Pictures of a table with eight blocks and a gripper by MuJoCo's renderer without a graphics card: SIZE all | colours
 
-At its fastest: no shadows, one sample a pixel; colours alone, where ours has depths, segments and shadows too.
+`all`: what ours draws at once, a picture with shadows, its depths and its segments; MuJoCo draws three times for that.
+`colours`: MuJoCo at its fastest, no shadows, one sample a pixel, and neither depths nor segments.
 Needs: pip install mujoco; apt-get install libosmesa6
 """
 
@@ -12,8 +13,8 @@ import time
 os.environ["MUJOCO_GL"] = "osmesa"
 import mujoco  # noqa: E402
 
-SIZE = int(sys.argv[1])
-PICTURES = {64: 1000, 224: 300}[SIZE]
+SIZE, IS_ALL = int(sys.argv[1]), sys.argv[2] == "all"
+PICTURES = {64: 1000, 224: 300}[SIZE] // (3 if IS_ALL else 1)
 
 BLOCKS = "".join(
     f'<body pos="{-0.15 + 0.1 * (n % 4)} {0.1 * (n // 4)} 0.025"><freejoint/>'
@@ -21,9 +22,9 @@ BLOCKS = "".join(
     for n in range(8)
 )
 SCENE = f"""<mujoco>
-  <visual><quality offsamples="0" shadowsize="0"/></visual>
+  <visual><quality offsamples="0" shadowsize="{1024 if IS_ALL else 0}"/></visual>
   <worldbody>
-    <light pos="0 0 2" castshadow="false"/>
+    <light pos="0 0 2" castshadow="{str(IS_ALL).lower()}"/>
     <geom type="box" size="0.4 0.4 0.02" pos="0 0 -0.02" rgba="0.6 0.5 0.4 1"/>
     {BLOCKS}
     <body pos="0 0 0.3">
@@ -40,12 +41,20 @@ model = mujoco.MjModel.from_xml_string(SCENE)
 data = mujoco.MjData(model)
 mujoco.mj_forward(model, data)
 with mujoco.Renderer(model, SIZE, SIZE) as renderer:
-    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = IS_ALL
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
 
     def draw() -> None:
         renderer.update_scene(data, "front")
         assert renderer.render().any(), "an empty picture"
+        if not IS_ALL:
+            return
+        renderer.enable_depth_rendering()
+        assert renderer.render().any(), "no depths"
+        renderer.disable_depth_rendering()
+        renderer.enable_segmentation_rendering()
+        assert renderer.render().any(), "no segments"
+        renderer.disable_segmentation_rendering()
 
     draw()
     begin = time.process_time()
