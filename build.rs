@@ -18,12 +18,13 @@ const FIRST_PROGRAMS: i32 = 12;
 const PROGRAMS: &str = "Program";
 
 /// Message types that a channel of a recording may carry, and the files that declare them.
-const MESSAGES: [(&str, &str); 14] = [
+const MESSAGES: [(&str, &str); 15] = [
     ("foxglove.CameraCalibration", "foxglove/CameraCalibration.proto"),
     ("foxglove.CompressedImage", "foxglove/CompressedImage.proto"),
     ("foxglove.CompressedVideo", "foxglove/CompressedVideo.proto"),
     ("foxglove.Event", "foxglove/Event.proto"),
     ("foxglove.FrameTransforms", "foxglove/FrameTransforms.proto"),
+    ("foxglove.JointStates", "foxglove/JointStates.proto"),
     ("foxglove.Log", "foxglove/Log.proto"),
     ("foxglove.SceneUpdate", "foxglove/SceneUpdate.proto"),
     ("ntp.v1.EpisodeEnd", "ntp/v1/episode_end.proto"),
