@@ -14,6 +14,7 @@ use crate::pipeline::{ItemRanges, Stage};
 use crate::publish::{Date, License, Place, Release};
 use crate::remote::Address;
 use crate::render::Channel;
+use crate::robot::RobotKind;
 use crate::task::{Family, Split};
 
 /// Hierarchical robot demonstrations with true labels: made, learned from, acted and judged by one pipeline file.
@@ -529,6 +530,9 @@ pub struct RobotArgs {
     /// The family of tasks that its table is for.
     #[arg(long, value_name = "FAMILY")]
     pub family: Family,
+    /// Which robot: `gripper`, which flies freely, or the arm `sawyer` before a table of its own.
+    #[arg(long, value_name = "ROBOT", default_value = "gripper")]
+    pub robot: RobotKind,
     /// Listen on a port of this machine, or on HOST:PORT [default: speak on stdin and stdout].
     #[arg(long, value_name = "PORT")]
     pub listen: Option<String>,

@@ -37,7 +37,7 @@ mod tables;
 mod validate;
 mod write;
 
-pub use config::{ConvertConfig, FailedEpisodes, FrameChoice};
+pub use config::{ActionChoice, ConvertConfig, FailedEpisodes, FrameChoice};
 pub use files::error::{ConvertError, DatasetError};
 pub use files::finding::{Finding, Severity, Validation};
 pub use pictures::{EpisodePictures, EpisodeRows, PictureLoader, Wanted};

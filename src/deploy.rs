@@ -28,7 +28,7 @@ use crate::rollout::{Limits, Oracle, Policy, RolloutEpisode, RolloutError, Start
 use crate::seed::Seed;
 use crate::sim::SimulationConfig;
 use crate::table::TableError;
-use crate::task::{Family, Task, Trial, initial_state};
+use crate::task::{Family, Task, Trial, initial_state_on};
 use crate::trace::{Actor, Episode, Provenance};
 
 /// Why a policy cannot act.
@@ -151,7 +151,8 @@ impl Trials<'_> {
         let trial = self.trial(index);
         let world = match resets {
             true => {
-                let initial = initial_state(self.task.family, &session.scene(), trial.seed);
+                let (family, scene) = (self.task.family, session.scene());
+                let initial = initial_state_on(family.layout_of(&scene), family, &scene, trial.seed);
                 RemoteRobot::reset(session, &initial)?
             }
             false => RemoteRobot::observe(session)?,

@@ -7,6 +7,7 @@
 //! Stages meet only through files whose schema is in `schemas/`. The modules below are in reading order; none uses a
 //! later one. ARCHITECTURE.md is the map.
 
+pub mod arm;
 pub mod artifact;
 pub mod feature;
 pub mod geometry;

@@ -41,6 +41,7 @@ mod events;
 mod file_records;
 mod index;
 mod inspect;
+mod joints;
 mod messages;
 mod observation;
 mod plan;

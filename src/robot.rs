@@ -9,9 +9,62 @@ mod judge;
 
 pub use judge::{Judgement, judge};
 
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
 use crate::program::Program;
 use crate::scene::{BodyIndex, Scene, SceneState, SlotIndex};
+use crate::task::{Layout, UnknownName};
 use crate::trace::{Cause, Frame, Push};
+
+/// Which robot acts.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotKind {
+    /// A gripper that flies freely.
+    #[default]
+    Gripper,
+    /// Rethink Robotics' Sawyer with the same gripper: see [`arm`](crate::arm).
+    Sawyer,
+}
+
+impl RobotKind {
+    /// Every robot.
+    pub const ALL: [Self; 2] = [Self::Gripper, Self::Sawyer];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gripper => "gripper",
+            Self::Sawyer => crate::arm::NAME,
+        }
+    }
+
+    /// Whether it is the one that acts where nobody names one.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// How things are laid out so that it reaches them all.
+    pub fn layout(self) -> Layout {
+        match self {
+            Self::Gripper => Layout::Table,
+            Self::Sawyer => Layout::Bench,
+        }
+    }
+}
+
+impl FromStr for RobotKind {
+    type Err = UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, UnknownName> {
+        let unknown = || UnknownName::new("robot", word, &Self::ALL.map(Self::name));
+        Self::ALL.into_iter().find(|kind| kind.name() == word).ok_or_else(unknown)
+    }
+}
 
 /// A call of the robot API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

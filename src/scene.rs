@@ -12,6 +12,7 @@ mod bowl;
 
 pub use bowl::{Bowl, Prism};
 
+use crate::arm::N_JOINTS;
 use crate::geometry::{Pose, Vec3, horizontal_distance};
 
 /// Index of a body in [`Scene::bodies`].
@@ -177,6 +178,8 @@ pub struct SceneState {
     pub held: Option<BodyIndex>,
     /// One pose a body, in the order of [`Scene::bodies`].
     pub bodies_in_world: Vec<Pose>,
+    /// The angles of the arm's joints in radians, from its base on; `None` of a gripper without an arm.
+    pub joints_rad: Option<[f32; N_JOINTS]>,
 }
 
 impl SceneState {

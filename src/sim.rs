@@ -27,7 +27,9 @@ mod engine_shape;
 mod error;
 mod grasp;
 mod gripper;
+mod links;
 mod motion;
+mod mover;
 mod sweep;
 mod watch;
 mod world;
@@ -37,7 +39,7 @@ pub use config::SimulationConfig;
 pub use error::SimError;
 
 use crate::geometry::yaw_rad;
-use crate::robot::{Action, RobotApi};
+use crate::robot::{Action, RobotApi, RobotKind};
 use crate::scene::{BodyIndex, Scene, SceneState, locked_bodies};
 use crate::trace::{Cause, Frame, Push};
 
@@ -46,7 +48,9 @@ use adversary::Adversary;
 use clock::Clock;
 use engine_shape::{IntoEngine as _, from_engine};
 use gripper::Gripper;
+use links::Links;
 use motion::Tool;
+use mover::{Mover, Stance, Way};
 use watch::{Watch, gravest};
 use world::World;
 
@@ -59,6 +63,8 @@ pub struct Simulation {
     config: SimulationConfig,
     world: World,
     gripper: Gripper,
+    mover: Mover,
+    links: Option<Links>,
     watch: Watch,
     clock: Clock,
     frames: Vec<Frame>,
@@ -78,14 +84,12 @@ impl Simulation {
     /// a body and gripper or table) overlap by more than a millimetre, or when something is held already.
     pub fn new(scene: Scene, initial: &SceneState, config: &SimulationConfig) -> Result<Self, SimError> {
         config.check()?;
-        let tool = Tool {
-            position: initial.gripper_in_world.translation.vector.into_engine(),
-            yaw_rad: yaw_rad(&initial.gripper_in_world),
-            opening_m: initial.opening_m,
-        };
+        let (mover, tool) = start(initial, config);
         check::check(&scene, initial, &tool)?;
         let mut world = World::new(&scene, initial, config);
         let gripper = Gripper::new(&mut world, tool);
+        let links = mover.stance().map(|stance| Links::new(&mut world, stance.posture));
+        let gripper = if links.is_some() { gripper.below_arm() } else { gripper };
         let clock = Clock::new(config.step_hz, config.frame_hz);
         let watch = Watch::new(initial);
         let mut simulation = Self {
@@ -93,6 +97,8 @@ impl Simulation {
             config: config.clone(),
             world,
             gripper,
+            mover,
+            links,
             watch,
             clock,
             frames: Vec::new(),
@@ -113,20 +119,57 @@ impl Simulation {
         locked_bodies(&self.scene, &self.state(), before)
     }
 
-    /// One step: the gripper goes to `tool`, in free flight where nothing else can happen, else in the engine.
-    fn tick(&mut self, tool: Tool, air: Air) {
-        if air == Air::Clear && self.world.is_quiet(self.gripper.held_handle()) {
-            self.gripper.fly(tool);
-        } else {
-            self.step_engine(tool);
+    /// One step along a way, in free flight where nothing else can happen, else in the engine.
+    fn step_along(&mut self, way: &Way, step: u32, air: Air) {
+        let is_clear = match air {
+            Air::Clear => true,
+            Air::Unknown => false,
+            Air::ClearFrom(z) => way.tool(step).position.z >= z,
+        };
+        if !(is_clear && self.world.is_quiet(self.gripper.held_handle())) {
+            let before = self.mover.stance().copied();
+            self.mover.stand(way.stance(step));
+            self.step_engine_from(before, way.tool(step));
+        } else if self.clock.is_due_next() || step == way.n_steps() {
+            // What lies between nobody sees.
+            self.mover.stand(way.stance(step));
+            self.gripper.fly(way.tool(step));
         }
+        self.pass();
+    }
+
+    /// One step of the engine, with the gripper at a tool that needs no other stance of the arm.
+    fn tick(&mut self, tool: Tool) {
+        self.step_engine(tool);
+        self.pass();
+    }
+
+    /// One step in which the gripper stays where it is.
+    fn wait(&mut self) {
+        if self.world.is_quiet(self.gripper.held_handle()) {
+            self.gripper.fly(self.gripper.tool);
+            self.pass();
+        } else {
+            self.tick(self.gripper.tool);
+        }
+    }
+
+    /// A step has passed.
+    fn pass(&mut self) {
         if self.clock.tick() {
             self.record(false);
         }
     }
 
     fn step_engine(&mut self, tool: Tool) {
+        self.step_engine_from(self.mover.stance().copied(), tool);
+    }
+
+    fn step_engine_from(&mut self, before: Option<Stance>, tool: Tool) {
         self.gripper.drive(&mut self.world, tool);
+        if let (Some(links), Some(before), Some(now)) = (&mut self.links, before, self.mover.stance()) {
+            links.drive(&mut self.world, before.posture, now.posture);
+        }
         self.world.step();
         self.drop_what_slipped();
     }
@@ -183,6 +226,24 @@ impl Simulation {
     }
 }
 
+/// What moves the gripper and where that is when the episode begins: an arm is at home.
+fn start(initial: &SceneState, config: &SimulationConfig) -> (Mover, Tool) {
+    match config.robot {
+        RobotKind::Gripper => {
+            let tool = Tool {
+                position: initial.gripper_in_world.translation.vector.into_engine(),
+                yaw_rad: yaw_rad(&initial.gripper_in_world),
+                opening_m: initial.opening_m,
+            };
+            (Mover::Free, tool)
+        }
+        RobotKind::Sawyer => {
+            let (stance, tool) = Stance::home(initial.opening_m);
+            (Mover::Arm(stance), tool)
+        }
+    }
+}
+
 impl RobotApi for Simulation {
     fn scene(&self) -> &Scene {
         &self.scene
@@ -198,6 +259,7 @@ impl RobotApi for Simulation {
             opening_m: self.gripper.tool.opening_m,
             held: self.gripper.held.map(|held| held.body),
             bodies_in_world,
+            joints_rad: self.mover.stance().map(|stance| stance.posture.0.map(|angle| angle as f32)),
         }
     }
 
@@ -213,7 +275,7 @@ impl RobotApi for Simulation {
         self.dropped = None;
         let performed = self.perform(action);
         if self.clock.time_nanos() == before_nanos {
-            self.tick(self.gripper.tool, Air::Clear);
+            self.wait();
         }
         let broken = self.judge(held_before);
         let released = held_before.filter(|_| action == Action::Release && self.gripper.held.is_none());

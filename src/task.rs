@@ -21,7 +21,7 @@ pub use goal::{Condition, Goal, SubTask, condition_holds, rests_on};
 pub use import::{ImportError, ImportProblem, import};
 pub use sampler::{SampleError, TaskPool, sample};
 pub use set::{TaskSet, TaskSetError};
-pub use trial::{Trial, initial_state, scene};
+pub use trial::{Layout, Trial, initial_state, initial_state_on, scene, scene_on};
 
 use std::fmt;
 use std::str::FromStr;
@@ -37,15 +37,19 @@ pub struct UnknownName {
     allowed: String,
 }
 
+impl UnknownName {
+    /// For a word that is none of those allowed.
+    pub(crate) fn new(kind: &'static str, word: &str, allowed: &[&str]) -> Self {
+        Self { kind, word: word.to_owned(), allowed: allowed.join(", ") }
+    }
+}
+
 impl FromStr for Family {
     type Err = UnknownName;
 
     fn from_str(word: &str) -> Result<Self, UnknownName> {
-        Self::ALL.into_iter().find(|family| family.name() == word).ok_or_else(|| UnknownName {
-            kind: "task family",
-            word: word.to_owned(),
-            allowed: Self::ALL.map(Self::name).join(", "),
-        })
+        let unknown = || UnknownName::new("task family", word, &Self::ALL.map(Self::name));
+        Self::ALL.into_iter().find(|family| family.name() == word).ok_or_else(unknown)
     }
 }
 
@@ -82,11 +86,8 @@ impl FromStr for Split {
     type Err = UnknownName;
 
     fn from_str(word: &str) -> Result<Self, UnknownName> {
-        Self::ALL.into_iter().find(|split| split.name() == word).ok_or_else(|| UnknownName {
-            kind: "split",
-            word: word.to_owned(),
-            allowed: Self::ALL.map(Self::name).join(", "),
-        })
+        let unknown = || UnknownName::new("split", word, &Self::ALL.map(Self::name));
+        Self::ALL.into_iter().find(|split| split.name() == word).ok_or_else(unknown)
     }
 }
 

@@ -10,6 +10,8 @@
 //!
 //! ```text
 //! world/{table, bodies/<name>, gripper/{palm, fingers}, target}   the scene
+//! world/arm/link_<n>                the arm, where there is one: the base and its links
+//! joints/<joint>                    the angles of its joints, in radians
 //! world/adversary, adversary        pushes of an adversary, where there are any: an arrow and a lane
 //! camera/{front, wrist}             what cameras see
 //! filmed/<camera>                   what the recording's own cameras saw, the first of them what a policy that sees saw
@@ -33,6 +35,7 @@
 //! The same replays give the same bytes: ids come from content, never from a clock.
 
 mod agreement;
+mod arm;
 mod blueprint;
 mod calls;
 mod clock;
@@ -268,6 +271,7 @@ fn recording(replay: &Replay<'_>) -> Result<Store, VisualizeError> {
     text::put_document(&mut store, replay)?;
     world::put(&mut store, episode)?;
     gripper::put(&mut store, episode)?;
+    arm::put(&mut store, episode)?;
     pushes::put(&mut store, episode)?;
     pictures::put(&mut store, replay)?;
     calls::put(&mut store, replay)?;

@@ -15,7 +15,8 @@ use crate::sim::SimulationConfig;
 const LOOPBACK: &str = "127.0.0.1";
 
 pub(super) fn run(args: &RobotArgs) -> anyhow::Result<CommandOutcome> {
-    let robot = || SimulatedRobot::new(args.family, SimulationConfig::default(), Seed(args.seed));
+    let config = SimulationConfig { robot: args.robot, ..SimulationConfig::default() };
+    let robot = || SimulatedRobot::new(args.family, config.clone(), Seed(args.seed));
     match &args.listen {
         None => serve(&mut robot(), std::io::stdin().lock(), std::io::stdout().lock())?,
         Some(place) => listen(place, robot)?,

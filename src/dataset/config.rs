@@ -36,6 +36,24 @@ pub enum FailedEpisodes {
     Include,
 }
 
+/// What `action` tells a learner to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ActionChoice {
+    /// How far the gripper moves to the next row, and whether it holds something then.
+    #[default]
+    Gripper,
+    /// The angles of the arm's joints at the next row, and whether the gripper holds something then. For recordings of
+    /// an arm.
+    Joints,
+}
+
+impl ActionChoice {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// Settings of the convert stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -44,6 +62,9 @@ pub struct ConvertConfig {
     pub frames: FrameChoice,
     /// What becomes of episodes that failed.
     pub failed: FailedEpisodes,
+    /// What `action` tells a learner to do.
+    #[serde(skip_serializing_if = "ActionChoice::is_default")]
+    pub action: ActionChoice,
     /// Rows per second that `timestamp` claims: `LeRobot` wants it regular. True times are in `ntp.time_secs`.
     pub fps: NonZeroU32,
     /// Size at which the next data file begins, in megabytes.
@@ -55,6 +76,7 @@ impl Default for ConvertConfig {
         Self {
             frames: FrameChoice::default(),
             failed: FailedEpisodes::default(),
+            action: ActionChoice::default(),
             fps: const { NonZeroU32::new(10).unwrap() },
             file_megabytes: const { NonZeroU32::new(100).unwrap() },
         }

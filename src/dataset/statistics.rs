@@ -17,8 +17,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::IoError;
+use crate::dataset::config::ActionChoice;
 use crate::dataset::files::info::Dtype;
-use crate::dataset::tables::frames::feature::{FEATURES, Feature};
+use crate::dataset::tables::frames::feature::{FEATURES, Feature, JOINTS};
 use crate::table::Values;
 
 pub(in crate::dataset) use number::copy_values;
@@ -122,9 +123,10 @@ pub(crate) struct NumericFeature {
 
 impl NumericFeature {
     /// Those of a dataset of ours, in the order of the columns.
-    pub(crate) fn all(n_slots: usize) -> Vec<Self> {
+    pub(crate) fn all(n_slots: usize, action: ActionChoice, has_joints: bool) -> Vec<Self> {
         let numeric = FEATURES.iter().filter(|feature| feature.is_numeric());
-        numeric.map(|feature| Self::of(feature, n_slots)).collect()
+        let joints = has_joints.then_some(&JOINTS);
+        numeric.chain(joints).map(|feature| Self::of(&feature.of_action(action), n_slots)).collect()
     }
 
     fn of(feature: &Feature, n_slots: usize) -> Self {

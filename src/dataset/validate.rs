@@ -21,7 +21,7 @@ use crate::dataset::tables::episodes::check::EpisodeCheck;
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::tables::frames::check::FrameCheck;
 use crate::dataset::tables::frames::expected::FullFrameBatch;
-use crate::dataset::tables::frames::feature::n_slots;
+use crate::dataset::tables::frames::feature::{action_of, n_slots};
 use crate::dataset::tables::scopes::check::{self as scopes, Labelled, ScopeBatch};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};
 use crate::trace::ProgramCall;
@@ -93,7 +93,7 @@ impl EpisodeChecks {
             arguments: Some(Cursor::new(root, layout::CALLS)),
             scopes: Some(Cursor::new(root, layout::SCOPES)),
         };
-        let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.fps));
+        let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.fps, action_of(info)));
         Ok(Self { n_slots, texts, tables, episodes, frames, calls: Vec::new() })
     }
 

@@ -52,6 +52,7 @@ impl Recorded<'_> {
             demonstrated: range(&first.demonstration.provenance.counts),
             on_table: range(&first.counts),
             bowls: None,
+            robot: self.session.robot(),
         }
     }
 

@@ -23,7 +23,9 @@ pub(super) fn of_starts(
         let demonstration = &start.demonstration;
         let Some(sight) = &start.sight else { return Ok(None) };
         let Some(found) = policy.detect(&sight.video)? else { return Ok(None) };
-        let camera = camera.camera(demonstration.provenance.family, Seed(demonstration.provenance.seed));
+        let family = demonstration.provenance.family;
+        let layout = family.layout_of(&demonstration.scene);
+        let camera = camera.camera_of(family, layout, Seed(demonstration.provenance.seed));
         let frames = demonstration.boundary_frames();
         let shares: Vec<Vec<f64>> =
             frames.map(|(_, frame)| visibility.shares(&demonstration.scene, &frame.state, &camera)).collect();

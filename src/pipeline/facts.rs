@@ -16,5 +16,6 @@ pub(super) fn of_suite(spec: &PipelineSpec, suite: &SuiteSpec) -> SuiteFacts {
         demonstrated: ends(suite.demonstrated()),
         on_table: ends(suite.on_table.unwrap_or(suite.demonstrated())),
         bowls: suite.bowls,
+        robot: suite.simulation(&spec.generate.simulation).robot.name().to_owned(),
     }
 }

@@ -153,8 +153,9 @@ pub(super) fn demonstrate(
 
 /// The world of a trial before anything has moved.
 pub(super) fn world(task: &Task, trial: &Trial, config: &SimulationConfig) -> Result<Simulation, PipelineError> {
-    let scene = task::scene(task.family, &trial.counts);
-    let initial = task::initial_state(task.family, &scene, trial.seed);
+    let layout = config.layout();
+    let scene = task::scene_on(layout, task.family, &trial.counts);
+    let initial = task::initial_state_on(layout, task.family, &scene, trial.seed);
     Ok(Simulation::new(scene, &initial, config)?)
 }
 

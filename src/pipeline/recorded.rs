@@ -40,7 +40,7 @@ pub struct Recorded {
     pub seed: u64,
     /// Which suite was acted; `None` for demonstrations.
     pub suite: Option<SuiteSpec>,
-    /// The physics.
+    /// The physics of the demonstrations.
     pub simulation: SimulationConfig,
     /// What filmed them.
     pub cameras: Vec<CameraConfig>,
@@ -56,6 +56,11 @@ impl Recorded {
         }
         let RolloutSettings { seed, suite, simulation, cameras, .. } = plan.setting(&[])?;
         Some(Self { seed, suite: Some(suite), simulation, cameras })
+    }
+
+    /// The physics in which they were acted: a suite may name another robot than the demonstrations'.
+    pub fn acted_in(&self) -> SimulationConfig {
+        self.suite.as_ref().map_or_else(|| self.simulation.clone(), |suite| suite.simulation(&self.simulation))
     }
 
     /// The suite's adversary, if it had one.

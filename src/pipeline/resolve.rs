@@ -237,6 +237,9 @@ impl Pipeline {
         if suite.split == Split::Unseen && self.spec.tasks.import.is_none() && self.n_unseen() == 0 {
             return Err(self.value(&key("split"), "is unseen, but tasks.unseen is 0"));
         }
+        if let Err(problem) = suite.simulation(&self.spec.generate.simulation).check() {
+            return Err(self.value(&key("layout"), problem.to_string()));
+        }
         self.check_towers(&key, suite)?;
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)?;

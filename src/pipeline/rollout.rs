@@ -306,7 +306,7 @@ impl Acting<'_> {
         }
         let recorded =
             if episode < pipeline.spec.rollout.record { RecordedFrames::All } else { RecordedFrames::Boundaries };
-        let config = simulation_config(recorded, &pipeline.spec.generate.simulation);
+        let config = simulation_config(recorded, &spec.simulation(&pipeline.spec.generate.simulation));
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
         let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
         let sight = self.sight(&demonstration, &world, own.seed)?;

@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::dataset::ConvertConfig;
 use crate::model::{CoreKind, Decoder, EncoderKind, ScopingKind, Variant};
 use crate::render::CameraConfig;
+use crate::robot::RobotKind;
 use crate::sim::{AdversaryConfig, SimulationConfig};
-use crate::task::{Family, Split, TaskPool};
+use crate::task::{Family, Layout, Split, TaskPool};
 use crate::trace::SpecificationForm;
 use crate::training::{TrainConfig, Training};
 
@@ -236,6 +237,22 @@ pub struct SuiteSpec {
     /// Knocks towers over after placements; none when left out. For families that build towers.
     #[serde(default)]
     pub adversary: Option<AdversaryConfig>,
+    /// Which robot acts: `gripper` or `sawyer`; that of `generate.simulation` when left out. Demonstrations are of that
+    /// one always.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<RobotKind>,
+    /// How things are laid out where the robot acts: `table` or `bench`; as its robot needs it when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layout: Option<Layout>,
+}
+
+impl SuiteSpec {
+    /// The physics that it is acted in; demonstrations are acted in that of `generate`.
+    pub fn simulation(&self, demonstrated: &SimulationConfig) -> SimulationConfig {
+        let robot = self.robot.unwrap_or(demonstrated.robot);
+        let layout = self.layout.or(if self.robot.is_none() { demonstrated.layout } else { None });
+        SimulationConfig { robot, layout, ..demonstrated.clone() }
+    }
 }
 
 /// In which order the towers of a task are demonstrated. Within a tower it is always from below.

@@ -58,13 +58,14 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
         return Ok(Verification::Unknown { problem });
     };
     let adversary = recorded.adversary();
-    let mut config = recorded.simulation;
+    let mut config = recorded.acted_in();
     if episode.frames.iter().all(|frame| frame.boundary) {
         config.frame_hz = 0;
     }
     let provenance = &episode.provenance;
-    let scene = task::scene(provenance.family, &provenance.counts);
-    let initial = task::initial_state(provenance.family, &scene, provenance.trial().seed);
+    let layout = config.layout();
+    let scene = task::scene_on(layout, provenance.family, &provenance.counts);
+    let initial = task::initial_state_on(layout, provenance.family, &scene, provenance.trial().seed);
     let world = Simulation::new(scene, &initial, &config)?;
     let mut world = disturbed(world, adversary, provenance.trial().seed)?;
     for call in episode.calls.iter() {

@@ -5,10 +5,10 @@ use prost::Message as _;
 use super::cameras::{Filmed, PicturesBeingRead};
 use super::error::MessageProblem;
 use super::observation::Observed;
-use super::schema::{CameraTopic, Topic, proto};
+use super::schema::{CameraTopic, Topic, foxglove, proto};
 use super::start::{self, Start};
 use super::transform::{self, GRIPPER};
-use super::{calls, observation, pushes};
+use super::{calls, joints, observation, pushes};
 use crate::geometry::Pose;
 use crate::scene::SceneState;
 use crate::trace::{Cause, EpisodeParts, Frame, Outcome, ProgramCall, Push, RecordedFrames};
@@ -138,6 +138,10 @@ impl Assembler {
                 let outcome = decode_outcome(&end)?;
                 return self.building.take().map(|building| building.assembled(outcome)).transpose();
             }
+            Topic::JointStates => {
+                let states = foxglove::JointStates::decode(data)?;
+                building.joints(log_time_nanos, &states)?;
+            }
             Topic::Push => {
                 let push = proto::Push::decode(data)?;
                 building.check_time(log_time_nanos, push.frames.map_or(0, |frames| frames.begin))?;
@@ -158,6 +162,7 @@ impl Building {
             opening_m: 0.0,
             held: None,
             bodies_in_world: vec![Pose::identity(); n_bodies],
+            joints_rad: None,
         };
         Ok(Self {
             start,
@@ -189,6 +194,14 @@ impl Building {
         })
     }
 
+    /// Joints stand between the transforms and the observation of their frame.
+    fn joints(&mut self, log_time_nanos: u64, states: &foxglove::JointStates) -> Result<(), MessageProblem> {
+        let transforms_nanos = self.transforms_at_nanos.ok_or(MessageProblem::Missing { field: "transforms" })?;
+        expect("log time", log_time_nanos, transforms_nanos)?;
+        self.state.joints_rad = Some(joints::decode(states)?);
+        Ok(())
+    }
+
     fn place(&mut self, child: &[u8], pose: Pose) -> Result<usize, MessageProblem> {
         let bodies = &self.start.scene.bodies;
         if child == GRIPPER.as_bytes() {
@@ -212,13 +225,14 @@ impl Building {
         if self.unplaced > 0 {
             return Err(MessageProblem::Missing { field: "transform of a body" });
         }
+        let joints_rad = self.state.joints_rad.take();
         let time_nanos = log_time_nanos - self.start_nanos;
         self.times_nanos.push(time_nanos);
         if boundary {
             self.boundaries.push(frame);
         }
         if boundary || self.keep == Keep::All {
-            let state = SceneState { opening_m, held, ..self.state.clone() };
+            let state = SceneState { opening_m, held, joints_rad, ..self.state.clone() };
             self.frames.push(Frame { time_nanos, boundary, state, slots: slots.clone() });
         }
         Ok(())

@@ -311,6 +311,9 @@ pub enum EpisodeProblem {
         /// The file's.
         expected: &'static str,
     },
+    /// All episodes of a file are of robots with an arm's joints, or of robots without.
+    #[error("its robot has joints and those of the file's others have none, or the other way round")]
+    Joints,
     /// A camera cannot film it.
     #[error("camera {camera}: {message}")]
     Camera {

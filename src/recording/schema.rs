@@ -33,6 +33,8 @@ pub(super) enum Topic {
     Event,
     Log,
     Push,
+    /// Of an arm alone.
+    JointStates,
 }
 
 /// Message type, number of programs known, descriptor set.
@@ -47,7 +49,7 @@ fn descriptor(message: &str, known: KnownPrograms) -> &'static [u8] {
 }
 
 impl Topic {
-    /// Every topic, in the order of their channels.
+    /// Every topic that each recording has, in the order of their channels.
     pub(super) const ALL: [Self; 11] = [
         Self::EpisodeStart,
         Self::EpisodeEnd,
@@ -64,10 +66,11 @@ impl Topic {
 
     /// Those that a reader reads; the others are for viewers.
     pub(super) fn read() -> impl Iterator<Item = Self> {
-        Self::READ.into_iter().chain([Self::Push])
+        Self::READ.into_iter().chain([Self::Push, Self::JointStates])
     }
 
-    /// Those that a reader cannot do without. Recordings from before there were pushes have none of them.
+    /// Those that a reader cannot do without. Recordings from before there were pushes have none of them, and those of
+    /// a gripper without an arm no joints.
     pub(super) const READ: [Self; 6] =
         [Self::EpisodeStart, Self::EpisodeEnd, Self::Transforms, Self::Observation, Self::Call, Self::Return];
 
@@ -85,6 +88,7 @@ impl Topic {
             Self::Event => "/ntp/event",
             Self::Log => "/log",
             Self::Push => "/ntp/push",
+            Self::JointStates => "/joint_states",
         }
     }
 
@@ -102,6 +106,7 @@ impl Topic {
             Self::Event => "foxglove.Event",
             Self::Log => "foxglove.Log",
             Self::Push => "ntp.v1.Push",
+            Self::JointStates => "foxglove.JointStates",
         }
     }
 

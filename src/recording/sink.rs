@@ -9,7 +9,7 @@ use prost::Message;
 use super::calls::{self, Step};
 use super::cameras::{Cameras, Filmed};
 use super::schema::{CameraTopic, Topic, proto};
-use super::{observation, pushes, start, transform, viewer};
+use super::{joints, observation, pushes, start, transform, viewer};
 use crate::artifact::AtomicFile;
 use crate::geometry::Pose;
 use crate::program::{KnownPrograms, Program};
@@ -41,6 +41,8 @@ pub(super) struct Sink {
     /// Next sequence number of each topic, then of those of each camera.
     sequences: Vec<u32>,
     buffer: Vec<u8>,
+    /// The channel of joints, behind those of cameras.
+    joints_channel: usize,
 }
 
 impl Sink {
@@ -54,12 +56,14 @@ impl Sink {
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES));
         let mcap = options.create(file)?;
-        Ok(Self { mcap, sequences: vec![0; Topic::ALL.len()], buffer: Vec::new() })
+        let joints_channel = Topic::ALL.len();
+        Ok(Self { mcap, sequences: vec![0; joints_channel + 1], buffer: Vec::new(), joints_channel })
     }
 
     /// Makes room for the channels of so many cameras.
     pub(super) fn set_cameras(&mut self, n_cameras: usize) {
-        self.sequences.resize(Topic::ALL.len() + TOPICS_PER_CAMERA * n_cameras, 0);
+        self.joints_channel = camera_channel(n_cameras, 0);
+        self.sequences.resize(self.joints_channel + 1, 0);
     }
 
     /// Writes what stands before the first message.
@@ -68,6 +72,7 @@ impl Sink {
         known: KnownPrograms,
         metadata: BTreeMap<String, String>,
         cameras: &Cameras,
+        has_joints: bool,
     ) -> Result<(), McapError> {
         self.mcap.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
         for topic in Topic::ALL {
@@ -82,6 +87,12 @@ impl Sink {
                 let id = camera_channel(number, kind) as u16 + 1;
                 self.mcap.add_channel_with_id(id, schema, &topic.name(camera), "protobuf", &BTreeMap::new())?;
             }
+        }
+        if has_joints {
+            let topic = Topic::JointStates;
+            let schema = self.mcap.add_schema(topic.message(), "protobuf", topic.descriptor(known))?;
+            let id = self.joints_channel as u16 + 1;
+            self.mcap.add_channel_with_id(id, schema, topic.name(), "protobuf", &BTreeMap::new())?;
         }
         Ok(())
     }
@@ -145,6 +156,9 @@ impl Sink {
         let written = self.put_bytes(Topic::Transforms, log_time_nanos, &buffer);
         self.buffer = buffer;
         written?;
+        if let Some(joints_rad) = &frame.state.joints_rad {
+            self.put_message(self.joints_channel, log_time_nanos, &joints::encode(log_time_nanos, joints_rad))?;
+        }
         self.put(Topic::Observation, log_time_nanos, &observation::encode(position, frame))
     }
 
@@ -173,10 +187,14 @@ impl Sink {
     }
 
     fn put(&mut self, topic: Topic, log_time_nanos: u64, message: &impl Message) -> Result<(), McapError> {
+        self.put_message(topic as usize, log_time_nanos, message)
+    }
+
+    fn put_message(&mut self, channel: usize, log_time_nanos: u64, message: &impl Message) -> Result<(), McapError> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         message.encode_raw(&mut buffer);
-        let written = self.put_bytes(topic, log_time_nanos, &buffer);
+        let written = self.put_channel(channel, log_time_nanos, &buffer);
         self.buffer = buffer;
         written
     }

@@ -52,6 +52,8 @@ pub struct ShardWriter {
     cameras: Cameras,
     /// Family of the first episode; all others are of it too.
     family: Option<Family>,
+    /// Whether the first episode's robot has joints; all others' have them too, or have none.
+    has_joints: bool,
     /// Log time of the next episode's start.
     next_start_nanos: u64,
     summary: ShardSummary,
@@ -72,6 +74,7 @@ impl ShardWriter {
             sink,
             cameras: Cameras::default(),
             family: None,
+            has_joints: false,
             next_start_nanos: 0,
             summary: ShardSummary::default(),
         })
@@ -126,6 +129,7 @@ impl ShardWriter {
         let filmed = film(&mut self.cameras).map_err(|problem| self.unrecordable(episode, problem))?;
         if self.family.is_none() {
             self.family = Some(episode.provenance.family);
+            self.has_joints = has_joints(episode);
             self.declare()?;
         }
         self.sink.episode(&times, episode, &steps, filmed).map_err(|error| failed(&self.path, error))?;
@@ -169,7 +173,7 @@ impl ShardWriter {
         if let Some(family) = self.family {
             metadata.insert("task_family".to_owned(), family.name().to_owned());
         }
-        self.sink.declare(known, metadata, &self.cameras).map_err(|error| failed(&self.path, error))
+        self.sink.declare(known, metadata, &self.cameras, self.has_joints).map_err(|error| failed(&self.path, error))
     }
 
     /// Whether an episode can be told, and when it happens.
@@ -177,6 +181,9 @@ impl ShardWriter {
         let found = episode.provenance.family;
         if let Some(expected) = self.family.filter(|&expected| expected != found) {
             return Err(EpisodeProblem::Family { found: found.name(), expected: expected.name() });
+        }
+        if self.family.is_some() && self.has_joints != has_joints(episode) {
+            return Err(EpisodeProblem::Joints);
         }
         let names: Vec<&str> = episode.scene.bodies.iter().map(|body| body.name.as_str()).collect();
         let is_taken = |&position: &usize| {
@@ -196,6 +203,11 @@ impl ShardWriter {
     fn unrecordable(&self, episode: &Episode, problem: EpisodeProblem) -> RecordingError {
         RecordingError::Unrecordable { path: self.path.clone(), episode: episode.provenance.index, problem }
     }
+}
+
+/// Whether its robot has joints: then each of its frames tells them.
+fn has_joints(episode: &Episode) -> bool {
+    episode.frames.first().is_some_and(|frame| frame.state.joints_rad.is_some())
 }
 
 fn failed(path: &Path, error: McapError) -> RecordingError {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::arm::N_JOINTS;
 use crate::scene::{Bowl, Shape};
 use crate::task::Family;
 use crate::trace::Cause;
@@ -223,6 +224,9 @@ pub(super) struct Observation {
     pub(super) time_ns: u64,
     pub(super) gripper: GripperMessage,
     pub(super) bodies: BTreeMap<String, PoseMessage>,
+    /// Angles of an arm's joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) joints_rad: Option<[f32; N_JOINTS]>,
 }
 
 /// Where everything is to be put: `reset`.

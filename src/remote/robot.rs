@@ -3,7 +3,7 @@
 use crate::remote::error::{RemoteError, RemoteProblem};
 use crate::remote::message::{Answer, Call, Observation, StateMessage, Target, Tray};
 use crate::remote::session::{CARRY, RESET, Session};
-use crate::remote::state::{read_cause, read_state, state_message};
+use crate::remote::state::{read_cause, read_joints, read_state, state_message};
 use crate::robot::{Action, HOVER_M, RobotApi};
 use crate::scene::{BodyIndex, Scene, SceneState, locked_bodies};
 use crate::trace::{Cause, Frame};
@@ -155,6 +155,10 @@ fn told(
     observation: Observation,
     before: Option<&SceneState>,
 ) -> Result<(u64, SceneState), RemoteProblem> {
-    let Observation { time_ns, gripper, bodies } = observation;
-    Ok((time_ns, read_state(scene, StateMessage { gripper, bodies }, before)?))
+    let Observation { time_ns, gripper, bodies, joints_rad } = observation;
+    let state = read_state(scene, StateMessage { gripper, bodies }, before)?;
+    let told = read_joints(joints_rad)?;
+    // A robot that has told them once keeps them, as what stands on the table keeps its place.
+    let joints_rad = before.map_or(told, |before| before.joints_rad.map(|known| told.unwrap_or(known)));
+    Ok((time_ns, SceneState { joints_rad, ..state }))
 }

@@ -12,9 +12,9 @@ use crate::remote::message::{
     Answer, ErrorMessage, Hello, Incoming, Outgoing, PROTOCOL_VERSION, StateMessage, Target, Tray, Welcome,
 };
 use crate::remote::session::{CARRY, RESET};
-use crate::remote::state::{check_names, observation, read_scene, read_state};
+use crate::remote::state::{check_names, observation, read_scene, read_state, scene_message};
 use crate::remote::wire::{Wire, read_line};
-use crate::robot::{Action, RobotApi as _};
+use crate::robot::{Action, RobotApi as _, RobotKind};
 use crate::scene::{BodyIndex, Mobility, Scene, SceneState, Slot, SlotIndex};
 use crate::seed::Seed;
 use crate::sim::{Simulation, SimulationConfig};
@@ -96,13 +96,24 @@ impl SimulatedRobot {
         if family != self.family {
             return Err((NO_PARAMS, format!("family {}; allowed: {}", family.name(), self.family.name())));
         }
-        let scene = read_scene(scene).map_err(wrong)?;
-        check_names(&scene, &task::scene(family, &counts(family, &scene))).map_err(wrong)?;
-        let initial = task::initial_state(family, &scene, self.seed);
+        let asked = read_scene(scene).map_err(wrong)?;
+        let layout = self.config.layout();
+        let own = task::scene_on(layout, family, &counts(family, &asked));
+        check_names(&asked, &own).map_err(wrong)?;
+        // An arm stands before a table of its own, from which it reaches all that is on it.
+        let (scene, told) = match self.config.robot {
+            RobotKind::Gripper => (asked, None),
+            RobotKind::Sawyer => (own.clone(), Some(scene_message(&own))),
+        };
+        let initial = task::initial_state_on(layout, family, &scene, self.seed);
         self.set_table(&scene, &initial)?;
         self.scene = Some(scene);
         let capabilities = [RESET, CARRY].map(str::to_owned).to_vec();
-        Ok(Welcome { protocol, robot: NAME.to_owned(), capabilities, scene: None })
+        let robot = match self.config.robot {
+            RobotKind::Gripper => NAME.to_owned(),
+            RobotKind::Sawyer => format!("{NAME}-{}", self.config.robot.name()),
+        };
+        Ok(Welcome { protocol, robot, capabilities, scene: told })
     }
 
     fn set_table(&mut self, scene: &Scene, initial: &SceneState) -> Result<(), Refusal> {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::arm::N_JOINTS;
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::remote::error::RemoteProblem;
 use crate::remote::message::{
@@ -20,6 +21,8 @@ const WIDE_M: f32 = 1.0;
 /// what rounding makes, and the orientation is taken as it is.
 const CROOKED: f32 = 0.01;
 const ROUNDED: f32 = 1e-5;
+/// No joint is turned further, in radians.
+const MOST_ANGLE_RAD: f32 = 100.0;
 /// Most bodies and slots of a scene.
 const MOST_BODIES: usize = 1000;
 
@@ -40,6 +43,18 @@ pub(super) fn scene_message(scene: &Scene) -> SceneMessage {
         table_half_m: *table_half_m,
         bodies: bodies.iter().map(body).collect(),
         slots: slots.iter().map(slot).collect(),
+    }
+}
+
+/// Joints that are told; an angle is a number, and no joint turns round and round.
+pub(super) fn read_joints(joints_rad: Option<[f32; N_JOINTS]>) -> Result<Option<[f32; N_JOINTS]>, RemoteProblem> {
+    let wrong = joints_rad.iter().flatten().find(|angle| !(-MOST_ANGLE_RAD..=MOST_ANGLE_RAD).contains(*angle));
+    match wrong {
+        None => Ok(joints_rad),
+        Some(found) => {
+            let (what, found) = ("joint's angle".to_owned(), found.to_string());
+            Err(RemoteProblem::Value { what, found, allowed: "-100 to 100 rad" })
+        }
     }
 }
 
@@ -156,7 +171,7 @@ pub(super) fn state_message(scene: &Scene, state: &SceneState) -> StateMessage {
 /// A state and its time as a message.
 pub(super) fn observation(scene: &Scene, state: &SceneState, time_ns: u64) -> Observation {
     let StateMessage { gripper, bodies } = state_message(scene, state);
-    Observation { time_ns, gripper, bodies }
+    Observation { time_ns, gripper, bodies, joints_rad: state.joints_rad }
 }
 
 fn pose_message(pose: &Pose) -> PoseMessage {
@@ -195,7 +210,7 @@ pub(super) fn read_state(
         position.map(|position| BodyIndex(position as u16)).ok_or_else(|| unknown("held body", &name, names()))
     });
     let gripper_in_world = read_pose("gripper", &PoseMessage { position_m, orientation_xyzw })?;
-    Ok(SceneState { gripper_in_world, opening_m, held: held.transpose()?, bodies_in_world })
+    Ok(SceneState { gripper_in_world, opening_m, held: held.transpose()?, bodies_in_world, joints_rad: None })
 }
 
 fn read_pose(name: &str, message: &PoseMessage) -> Result<Pose, RemoteProblem> {

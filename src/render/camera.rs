@@ -7,7 +7,7 @@
 
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::scene::SceneState;
-use crate::task::{Family, FrontView};
+use crate::task::{Family, FrontView, Layout};
 
 /// What a camera is fixed to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,12 @@ impl Camera {
 
     /// Third person, fixed: before the table and above it, with all that a family's programs reach in its picture.
     pub fn front(family: Family, size_px: [u32; 2]) -> Self {
-        let FrontView { eye_m, target_m } = family.front_view();
+        Self::front_of(family, Layout::Table, size_px)
+    }
+
+    /// The same of a layout: before an arm it is in the picture too.
+    pub fn front_of(family: Family, layout: Layout, size_px: [u32; 2]) -> Self {
+        let FrontView { eye_m, target_m } = family.front_view(layout);
         Self::new(Mount::World(looking_at(&eye_m.into(), &target_m.into())), size_px, FRONT_FOV_RAD)
     }
 

@@ -8,7 +8,7 @@ use crate::render::look::Look;
 use crate::render::randomize::Randomization;
 use crate::scene::Scene;
 use crate::seed::Seed;
-use crate::task::Family;
+use crate::task::{Family, Layout};
 
 /// Where a camera stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -162,8 +162,13 @@ impl CameraConfig {
 
     /// The camera of an episode. See [`CameraConfig::seed`].
     pub fn camera(&self, family: Family, seed: Seed) -> Camera {
+        self.camera_of(family, Layout::Table, seed)
+    }
+
+    /// The same of an episode in a layout.
+    pub fn camera_of(&self, family: Family, layout: Layout, seed: Seed) -> Camera {
         let usual = match self.view {
-            Viewpoint::Front => Camera::front(family, self.size_px),
+            Viewpoint::Front => Camera::front_of(family, layout, self.size_px),
             Viewpoint::Wrist => Camera::wrist(self.size_px),
             Viewpoint::Fixed => {
                 let [eye, target] = [self.eye_m, self.target_m].map(|place| Vec3::from(place.unwrap_or_default()));

@@ -1,8 +1,11 @@
 //! The meshes of a scene: table, bodies, gripper.
 
+mod arm;
 mod body;
 mod gripper;
 mod table;
+
+pub(super) use arm::ArmPart;
 
 use crate::render::look::Look;
 use crate::render::mesh::Mesh;
@@ -18,6 +21,9 @@ pub(super) struct Model {
     pub(super) hand: Mesh,
     /// A finger whose inner side is at y = 0, on the side of y; the other is its mirror image by half a turn.
     pub(super) finger: Mesh,
+    /// The hand below an arm, and the parts of that.
+    pub(super) hand_of_arm: Mesh,
+    pub(super) arm: Vec<ArmPart>,
 }
 
 impl Model {
@@ -29,6 +35,8 @@ impl Model {
             bodies: bodies.map(|(index, body)| body::mesh(body, color(index), look.letters)).collect(),
             hand: gripper::hand(look.stem_m),
             finger: gripper::finger(),
+            hand_of_arm: gripper::hand(0.0),
+            arm: arm::parts(),
         }
     }
 }

@@ -33,7 +33,7 @@ pub enum Segment {
     Background,
     /// The table.
     Table,
-    /// The gripper or its stem.
+    /// The gripper, its stem or its arm.
     Gripper,
     /// A body.
     Body(BodyIndex),

@@ -1,10 +1,11 @@
 //! Draws pictures, one after the other, in the same memory.
 
+use crate::arm::links_in_world;
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::render::camera::Camera;
 use crate::render::look::Look;
 use crate::render::mesh::Mesh;
-use crate::render::model::Model;
+use crate::render::model::{ArmPart, Model};
 use crate::render::picture::{Picture, Segment};
 use crate::render::raster::{NOTHING, Raster};
 use crate::render::shade::{Drawn, Palette, Prepared, Shader};
@@ -112,13 +113,26 @@ fn things<'m>(model: &'m Model, state: &SceneState) -> Vec<Thing<'m>> {
     };
     let half_turn = Rotation::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0));
     let table = Thing { mesh: &model.table, in_world: Pose::identity(), segment: Segment::Table };
-    let hand = Thing { mesh: &model.hand, in_world: gripper, segment: Segment::Gripper };
+    let links = state.joints_rad.as_ref().map(links_in_world);
+    let hand = if links.is_some() { &model.hand_of_arm } else { &model.hand };
+    let hand = Thing { mesh: hand, in_world: gripper, segment: Segment::Gripper };
+    let arm = links.into_iter().flat_map(|links| {
+        model.arm.iter().map(move |ArmPart { link, in_link, mesh }| Thing {
+            mesh,
+            in_world: links[*link] * in_link,
+            segment: Segment::Gripper,
+        })
+    });
     let bodies = model.bodies.iter().zip(&state.bodies_in_world).enumerate().map(|(index, (mesh, in_world))| Thing {
         mesh,
         in_world: *in_world,
         segment: Segment::Body(BodyIndex(index as u16)),
     });
-    std::iter::once(table).chain(bodies).chain([hand, finger(Rotation::identity()), finger(half_turn)]).collect()
+    std::iter::once(table)
+        .chain(bodies)
+        .chain([hand, finger(Rotation::identity()), finger(half_turn)])
+        .chain(arm)
+        .collect()
 }
 
 fn view(camera: &Camera, state: &SceneState, samples: u32) -> View {

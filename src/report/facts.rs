@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::report::ReportError;
 use crate::report::frames::Rows;
+use crate::robot::RobotKind;
 use crate::task::Split;
 
 /// The families of the paper's experiments, as files name them.
@@ -14,7 +15,7 @@ pub(super) const OBJECT_SORTING: &str = "object_sorting";
 pub(super) const TABLE_CLEANUP: &str = "table_cleanup";
 
 /// The columns of [`SuiteFacts`].
-pub(super) const COLUMNS: [(&str, DataType); 12] = [
+pub(super) const COLUMNS: [(&str, DataType); 13] = [
     ("split", DataType::String),
     ("family", DataType::String),
     ("blocks", DataType::Int64),
@@ -27,6 +28,7 @@ pub(super) const COLUMNS: [(&str, DataType); 12] = [
     ("on_table_max", DataType::Int64),
     ("bowls", DataType::Int64),
     ("objects", DataType::Int64),
+    ("robot", DataType::String),
 ];
 
 /// What a suite asks for. A fact is null where the suite has no such thing, where its episodes differ in it, and where
@@ -59,6 +61,9 @@ pub struct SuiteFacts {
     pub objects_min: Option<i64>,
     /// The most.
     pub objects_max: Option<i64>,
+    /// Which robot acts, where it is not the gripper that flies freely.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
 }
 
 /// What a suite of the paper asks for, whichever the family.
@@ -84,6 +89,7 @@ impl SuiteFacts {
         let real =
             |name: &str| Ok::<_, ReportError>(same(rows.optional_real(name)?, rows.optional_real(&highest(name))?));
         let (mut split, mut family, mut order) = (text("split")?, text("family")?, text("order")?);
+        let mut robot = text("robot")?;
         let (probability, impulse) = (real("adversary_probability")?, real("adversary_impulse_ns")?);
         let (demonstrated_min, demonstrated_max) = (whole("demonstrated_min")?, whole("demonstrated_max")?);
         let (on_table_min, on_table_max) = (whole("on_table_min")?, whole("on_table_max")?);
@@ -103,12 +109,16 @@ impl SuiteFacts {
             bowls: bowls[row],
             objects_min: objects_min[row],
             objects_max: objects_max[row],
+            robot: robot[row].take().filter(|robot| robot != RobotKind::default().name()),
         };
         Ok((0..blocks.len()).map(facts).collect())
     }
 
-    /// Which part of the paper's experiments it is, as far as it is known.
+    /// Which part of the paper's experiments it is, as far as it is known; `None` with another robot than they have.
     pub(super) fn ask(&self) -> Option<Ask> {
+        if self.robot.is_some() {
+            return None;
+        }
         let split = self.split.as_deref()?;
         Some(match self.order.as_deref()? {
             _ if self.adversary_probability? > 0.0 => Ask::Adversary,
@@ -159,6 +169,7 @@ impl SuiteFacts {
         words.extend((self.order.as_deref() == Some("shuffled")).then(|| "towers in another order".to_owned()));
         let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
         words.extend(push.map(|(percent, mns)| format!("a push of {mns} mN\u{202f}s at {percent} %")));
+        words.extend(self.robot.as_deref().map(|robot| format!("acted by {}", capitalized(robot))));
         if !self.shows_what_is_there() {
             words.push("more on the table than was shown".to_owned());
         }

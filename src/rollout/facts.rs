@@ -21,6 +21,8 @@ pub struct SuiteFacts {
     pub demonstrated: Option<[u16; 2]>,
     /// Instances of each category on the table, at least and at most.
     pub on_table: Option<[u16; 2]>,
+    /// Which robot acts; of others what it calls itself.
+    pub robot: String,
     /// Bowls that each task asks for; `None` where tasks differ in that, or ask for none.
     pub bowls: Option<u16>,
 }

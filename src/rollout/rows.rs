@@ -108,6 +108,8 @@ table! {
         scoping: OptionalText later,
         /// how the model reads observations; null for the oracle
         encoder: OptionalText later,
+        /// which robot acts: `gripper`, `sawyer`, or what a robot of others calls itself; null in files that were written before there was an arm
+        robot: OptionalText later,
     }
 }
 
@@ -169,7 +171,7 @@ impl RolloutRows {
     }
 }
 
-fn row<'a>(suite: &'a str, facts: &SuiteFacts, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
+fn row<'a>(suite: &'a str, facts: &'a SuiteFacts, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
     let RolloutEpisode { episode, decisions, first_divergence, fault_decision, pushes, judgement } = rollout;
     let end = |range: Option<[u16; 2]>, at: usize| range.map(|range| i64::from(range[at]));
     let part = |get: fn(&ModelFacts) -> &'static str| by.model.as_ref().map(|model| get(model).into());
@@ -214,5 +216,6 @@ fn row<'a>(suite: &'a str, facts: &SuiteFacts, by: &Acted, rollout: &'a RolloutE
         core: part(|model| model.core),
         scoping: part(|model| model.scoping),
         encoder: part(|model| model.encoder),
+        robot: Some(facts.robot.as_str().into()),
     }
 }

@@ -1,21 +1,23 @@
 //! The three actions of the robot API, as motions of the gripper.
 
-use rapier3d::math::{Pose as EnginePose, Vector};
+use rapier3d::math::{Pose as EnginePose, Rotation, Vector};
 
+use crate::arm::{Obstacles, Solid};
 use crate::robot::{Action, HOVER_M};
 use crate::scene::{BodyIndex, Mobility, SlotIndex};
 use crate::sim::Simulation;
 use crate::sim::drop_spot;
 use crate::sim::grasp::{self, Grasp};
 use crate::sim::gripper::{Gripper, MAX_OPENING_M, PALM_M, TIP_M};
-use crate::sim::motion::{Motion, Tool};
+use crate::sim::motion::Tool;
+use crate::sim::mover::{Around, MARGIN_M, Stance, Transit, Way, in_base};
 use crate::sim::sweep::AtStart;
 use crate::trace::Cause;
 
 /// Least height of gripper and load above everything on the way across, in metres.
 const CLEARANCE_M: f32 = 0.02;
 /// How near the gripper comes to what it must not touch, in metres.
-const MARGIN_M: f32 = 0.002;
+const NEAREST_M: f32 = 0.002;
 /// How high above what lies below a held body is let go, in metres.
 const SET_DOWN_M: f32 = 0.001;
 /// The same in a container, where what lies below is uneven.
@@ -29,12 +31,24 @@ const CLOSE_M_PER_S: f32 = 0.25;
 const SPARE_TICKS: u32 = 12;
 
 /// What is known of the way ahead.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) enum Air {
     /// Nothing that sleeps stands in it.
     Clear,
     /// Something may: the engine decides.
     Unknown,
+    /// Nothing from this height up.
+    ClearFrom(f32),
+}
+
+/// Where `move_to` leads to.
+struct Goal {
+    /// What is to be below the gripper.
+    target: Vector,
+    /// Height to go across at.
+    transit_z: f32,
+    /// Where it ends.
+    hover_z: f32,
 }
 
 impl Simulation {
@@ -44,16 +58,20 @@ impl Simulation {
             Action::Grip if self.gripper.held.is_some() => Ok(()),
             Action::Grip => self.grip(),
             Action::Release => match self.gripper.held {
-                None => {
-                    self.open();
-                    Ok(())
-                }
+                None => self.open(),
                 Some(_) => self.release(),
             },
         }
     }
 
     fn move_to(&mut self, slot: SlotIndex) -> Result<(), Cause> {
+        let goal = self.goal(slot)?;
+        self.cross(&goal)?;
+        self.sink(goal.hover_z, CLEARANCE_M)
+    }
+
+    /// Where `move_to` leads to now.
+    fn goal(&self, slot: SlotIndex) -> Result<Goal, Cause> {
         let Some(&body) = self.locked().get(usize::from(slot.0)) else {
             return Err(Cause::UnknownSlot);
         };
@@ -63,32 +81,64 @@ impl Simulation {
         let lowest_z = self.gripper.lowest_z(&self.world);
         let below_m = self.gripper.tool.position.z - lowest_z;
         let transit_z = (self.world.top_z(held) + below_m + CLEARANCE_M).max(hover_z).max(self.gripper.tool.position.z);
-        self.rise(transit_z);
-        let over = Vector::new(target.x, target.y, transit_z) - self.gripper.hangs_beside(&self.scene);
-        self.follow(Tool { position: over, yaw_rad: 0.0, ..self.gripper.tool }, |_| Air::Clear);
-        self.sink(hover_z, CLEARANCE_M);
+        Ok(Goal { target, transit_z, hover_z })
+    }
+
+    /// Up, and across to above a place.
+    fn cross(&mut self, goal: &Goal) -> Result<(), Cause> {
+        let Some(stance) = self.mover.stance() else {
+            self.rise(goal.transit_z)?;
+            let above = Vector::new(goal.target.x, goal.target.y, goal.transit_z);
+            let position = above - self.gripper.hangs_beside(&self.scene);
+            return self.follow(Tool { position, yaw_rad: 0.0, ..self.gripper.tool }, Air::Clear);
+        };
+        for way in self.ways(stance, goal)? {
+            match way {
+                Way::Joints { .. } => self.go(&way, Air::Clear),
+                Way::Free(_) | Way::Straight(..) => self.go_up(&way),
+            }
+        }
         Ok(())
     }
 
+    /// The ways of an arm up and across.
+    fn ways(&self, stance: &Stance, goal: &Goal) -> Result<Vec<Way>, Cause> {
+        let beside = self.gripper.hangs_beside(&self.scene);
+        let over = |yaw_rad: f32| goal.target - Rotation::from_rotation_z(yaw_rad) * beside;
+        let transit = Transit { over: &over, transit_z: goal.transit_z, hover_z: goal.hover_z };
+        stance.transit(self.gripper.tool, &transit, &self.around(), &self.config)
+    }
+
+    /// Plans an arm's ways up and across to above a slot, and moves nothing: how many stretches they are. None without
+    /// an arm, which needs no plan.
+    ///
+    /// # Errors
+    ///
+    /// [`Cause::NoPath`] when there is no way, [`Cause::UnknownSlot`] when there is no such slot.
+    pub fn planned_stretches(&self, slot: SlotIndex) -> Result<usize, Cause> {
+        let goal = self.goal(slot)?;
+        self.mover.stance().map_or(Ok(0), |stance| Ok(self.ways(stance, &goal)?.len()))
+    }
+
     fn grip(&mut self) -> Result<(), Cause> {
-        self.open();
+        self.open()?;
         // From the palm: a body that was just released reaches above the gripper's reference point.
         let palm = self.gripper.tool.at_height(self.gripper.tool.position.z + PALM_M).position;
         let found = self.world.below(palm, None);
         let found_z = palm.z - found.map_or(0.0, |hit| hit.distance_m);
         let aim = found.and_then(|hit| hit.body).filter(|&body| self.scene.body(body).mobility == Mobility::Movable);
         let Some(body) = aim else {
-            self.sink(found_z + TIP_M, MARGIN_M);
-            self.close_on_air();
+            self.sink(found_z + TIP_M, NEAREST_M)?;
+            self.close_on_air()?;
             return self.miss();
         };
         let shape = self.scene.body(body).shape;
         let grasp = self.plan_grasp(body);
-        self.follow(Tool { yaw_rad: grasp.yaw_rad, ..self.gripper.tool }, |_| Air::Unknown);
-        if !self.shift(grasp.position) {
+        self.follow(Tool { yaw_rad: grasp.yaw_rad, ..self.gripper.tool }, Air::Unknown)?;
+        if !self.shift(grasp.position)? {
             return self.miss();
         }
-        self.sink(grasp.position.z, 0.0);
+        self.sink(grasp.position.z, 0.0)?;
         if !self.close_on(body) || !grasp::is_between_fingers(&shape, &self.gripper.tool, &self.world.in_world(body)) {
             return self.miss();
         }
@@ -112,7 +162,7 @@ impl Simulation {
     }
 
     fn miss(&mut self) -> Result<(), Cause> {
-        self.open();
+        self.open()?;
         Err(Cause::MissedGrasp)
     }
 
@@ -122,20 +172,17 @@ impl Simulation {
             Some(container) => {
                 self.gripper.opens_to_m = drop_spot::opening_m(&self.scene, &self.gripper, container);
                 let spot = drop_spot::choose(&self.scene, &self.world, &self.gripper, container);
-                self.shift(spot);
+                self.shift(spot)?;
                 DROP_M
             }
         };
-        self.sink(f32::MIN, gap_m);
+        self.sink(f32::MIN, gap_m)?;
         self.lift_off_z = None;
         let Some(body) = self.gripper.let_go(&mut self.world) else {
             return Err(Cause::DroppedObject);
         };
         let open = Tool { opening_m: self.gripper.opens_to_m, ..self.gripper.tool };
-        let opening = Motion::new(self.gripper.tool, open, &self.config);
-        for step in 1..=opening.n_steps {
-            self.tick(opening.at(step), Air::Unknown);
-        }
+        self.follow(open, Air::Unknown)?;
         Gripper::part_from(&mut self.world, body);
         self.rest()
     }
@@ -143,7 +190,7 @@ impl Simulation {
     /// Steps until all is at rest.
     pub(super) fn rest(&mut self) -> Result<(), Cause> {
         for step in 0..self.config.settle_limit_steps() {
-            self.tick(self.gripper.tool, Air::Unknown);
+            self.tick(self.gripper.tool);
             if self.is_at_rest(step) {
                 return Ok(());
             }
@@ -151,15 +198,15 @@ impl Simulation {
         Err(Cause::TimeLimit)
     }
 
-    fn open(&mut self) {
+    fn open(&mut self) -> Result<(), Cause> {
         self.gripper.opens_to_m = MAX_OPENING_M;
-        self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, |_| Air::Unknown);
+        self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, Air::Unknown)
     }
 
     /// Closes until the fingers meet each other or something that is not to be grasped.
-    fn close_on_air(&mut self) {
+    fn close_on_air(&mut self) -> Result<(), Cause> {
         let opening_m = self.gripper.tool.opening_m - 2.0 * self.gripper.free_closing_m(&self.world);
-        self.follow(Tool { opening_m, ..self.gripper.tool }, |_| Air::Unknown);
+        self.follow(Tool { opening_m, ..self.gripper.tool }, Air::Unknown)
     }
 
     /// Closes until both fingers touch the body, which the first to touch pushes to the other; whether they do in
@@ -176,51 +223,78 @@ impl Simulation {
             }
             let tool = self.gripper.tool;
             let opening_m = (tool.opening_m - 2.0 * farther_m.min(most_m)).max(0.0);
-            self.tick(Tool { opening_m, ..tool }, Air::Unknown);
+            self.tick(Tool { opening_m, ..tool });
         }
         false
     }
 
     /// Level to above a place; whether the way was free, else nothing moves.
-    fn shift(&mut self, place: Vector) -> bool {
+    fn shift(&mut self, place: Vector) -> Result<bool, Cause> {
         let tool = self.gripper.tool;
         let over = Vector::new(place.x, place.y, tool.position.z);
         let way = over - tool.position;
         let is_free = self.gripper.free_way_m(&self.world, &tool, way, AtStart::MayLeave) >= way.length();
         if is_free {
-            self.follow(Tool { position: over, ..tool }, |_| Air::Clear);
+            self.follow(Tool { position: over, ..tool }, Air::Clear)?;
         }
-        is_free
+        Ok(is_free)
     }
 
     /// Straight up to a height; not at all when it is higher already.
-    pub(super) fn rise(&mut self, z: f32) {
+    pub(super) fn rise(&mut self, z: f32) -> Result<(), Cause> {
         let tool = self.gripper.tool;
-        let way = Vector::new(0.0, 0.0, z - tool.position.z);
-        if way.z <= 0.0 {
+        if z > tool.position.z {
+            let way = self.way(tool.at_height(z))?;
+            self.go_up(&way);
+        }
+        Ok(())
+    }
+
+    /// Follows a way that leads straight up.
+    fn go_up(&mut self, way: &Way) {
+        let tool = self.gripper.tool;
+        let up = Vector::new(0.0, 0.0, way.end().0.position.z - tool.position.z);
+        if up.z <= 0.0 {
             return;
         }
-        let is_free = self.gripper.free_way_m(&self.world, &tool, way, AtStart::MayLeave) >= way.z;
+        let is_free = self.gripper.free_way_m(&self.world, &tool, up, AtStart::MayLeave) >= up.z;
         let clear_z = if is_free { self.lift_off_z.unwrap_or(f32::MIN) } else { f32::MAX };
-        self.follow(tool.at_height(z), |tool| if tool.position.z >= clear_z { Air::Clear } else { Air::Unknown });
+        self.go(way, Air::ClearFrom(clear_z));
         self.lift_off_z = None;
     }
 
     /// Straight down to a height, or until the gripper or what it holds is `gap_m` above something.
-    fn sink(&mut self, z: f32, gap_m: f32) {
+    fn sink(&mut self, z: f32, gap_m: f32) -> Result<(), Cause> {
         let tool = self.gripper.tool;
         let depth_m = (tool.position.z - z).min(2.0);
         let free_m = self.gripper.free_way_m(&self.world, &tool, Vector::new(0.0, 0.0, -depth_m), AtStart::Stops);
         let way_m = if free_m < depth_m { (free_m - gap_m).max(0.0) } else { depth_m };
-        self.follow(tool.at_height(tool.position.z - way_m), |_| Air::Clear);
+        self.follow(tool.at_height(tool.position.z - way_m), Air::Clear)
     }
 
-    fn follow(&mut self, to: Tool, air: impl Fn(&Tool) -> Air) {
-        let motion = Motion::new(self.gripper.tool, to, &self.config);
-        for step in 1..=motion.n_steps {
-            let tool = motion.at(step);
-            self.tick(tool, air(&tool));
-        }
+    /// A straight way from where the gripper is.
+    fn way(&self, to: Tool) -> Result<Way, Cause> {
+        self.mover.way(self.gripper.tool, to, || self.around(), &self.config)
+    }
+
+    fn follow(&mut self, to: Tool, air: Air) -> Result<(), Cause> {
+        let way = self.way(to)?;
+        self.go(&way, air);
+        Ok(())
+    }
+
+    fn go(&mut self, way: &Way, air: Air) {
+        (1..=way.n_steps()).for_each(|step| self.step_along(way, step, air));
+    }
+
+    /// What an arm must keep clear of now: everything that it does not hold.
+    pub(super) fn around(&self) -> Around {
+        let solids = self
+            .world
+            .boxes(self.gripper.held_handle())
+            .map(|bounds| Solid { least: in_base(bounds.mins), most: in_base(bounds.maxs) });
+        let obstacles = Obstacles { solids: solids.collect(), ..Obstacles::table(in_base(Vector::ZERO).z, MARGIN_M) };
+        Around { obstacles, load: self.gripper.load(&self.world) }
     }
 
     fn body_in_world(&self, body: BodyIndex) -> EnginePose {

@@ -31,6 +31,10 @@ const ROLL_M: f32 = 0.2;
 const WAY_M: f32 = 0.05;
 /// A body stands on another when its centre is no more than this above where it would touch it, in metres.
 const TOUCH_M: f32 = 0.004;
+/// Height of the gripper when it grips a block on the table, in metres.
+const GRIPPED_Z_M: f32 = 0.045;
+/// Heights that are tried where the gripper cannot rise as far, in metres apart.
+const LOWER_M: f32 = 0.02;
 /// The strongest push that is allowed.
 const MOST_IMPULSE_NS: f32 = 1.0;
 
@@ -135,12 +139,19 @@ impl Simulation {
 
     /// The gripper gives way, each body gets the impulse, all comes to rest. Gives the last frame before the impulse.
     fn push(&mut self, bodies: &[BodyIndex], impulse_ns: Vector) -> u32 {
-        self.rise(self.gripper.tool.position.z + HOVER_M - GRASP_M);
+        self.give_way();
         let frame_before = (self.frames.len() as u32).saturating_sub(1);
         bodies.iter().for_each(|&body| self.world.push(body, impulse_ns));
         // What does not come to rest in time is seen to move in the frame.
         let _rested = self.rest();
         frame_before
+    }
+
+    /// Up to where `move_to` hovers, or as high as an arm can.
+    fn give_way(&mut self) {
+        let z = self.gripper.tool.position.z;
+        let heights = (0..).map(|step| z + HOVER_M - GRASP_M - LOWER_M * step as f32);
+        heights.take_while(|&height| height > z).any(|height| self.rise(height).is_ok());
     }
 
     /// What each body stands on: a movable body, or `None`.
@@ -182,7 +193,9 @@ impl Simulation {
         let on_table = |&direction: &Vector| {
             let end = from + direction * length_m;
             let [half_x, half_y] = self.scene.table_half_m;
-            end.x.abs() + WAY_M <= half_x && end.y.abs() + WAY_M <= half_y
+            let is_on = end.x.abs() + WAY_M <= half_x && end.y.abs() + WAY_M <= half_y;
+            // What falls out of an arm's reach nobody could build up again.
+            is_on && self.mover.reaches(Vector::new(end.x, end.y, GRIPPED_Z_M))
         };
         let in_the_way =
             |direction: &Vector| others.iter().filter(|way| is_in_way(**way, *direction, length_m)).count();

@@ -15,6 +15,12 @@ impl Clock {
         Self { n_steps: 0, step_hz: u64::from(step_hz), frame_hz: u64::from(frame_hz) }
     }
 
+    /// Whether a frame between boundaries will be due after the next step.
+    pub(super) fn is_due_next(&self) -> bool {
+        let mut next = *self;
+        next.tick()
+    }
+
     /// One step has passed; whether a frame between boundaries is due now.
     pub(super) fn tick(&mut self) -> bool {
         let frames = |n_steps: u64| n_steps * self.frame_hz / self.step_hz;

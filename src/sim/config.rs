@@ -2,12 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::robot::RobotKind;
 use crate::sim::SimError;
+use crate::task::Layout;
 
 /// Settings of a simulation. The defaults are what the published figures were measured with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulationConfig {
+    /// Which robot acts: `gripper`, which flies freely, or the arm `sawyer`.
+    #[serde(skip_serializing_if = "RobotKind::is_default")]
+    pub robot: RobotKind,
+    /// How things are laid out: `table`, or `bench` about an arm; when left out as the robot needs it. An arm has to
+    /// have its bench.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layout: Option<Layout>,
     /// Physics steps per simulated second, 120 to 2000. Contacts are tuned for 240.
     pub step_hz: u32,
     /// Recorded frames per simulated second between boundaries, at most `step_hz`; 0 records boundaries alone.
@@ -22,7 +31,15 @@ pub struct SimulationConfig {
 
 impl Default for SimulationConfig {
     fn default() -> Self {
-        Self { step_hz: 240, frame_hz: 10, speed_m_per_s: 1.25, acceleration_m_per_s2: 15.0, settle_limit_secs: 3.0 }
+        Self {
+            robot: RobotKind::default(),
+            layout: None,
+            step_hz: 240,
+            frame_hz: 10,
+            speed_m_per_s: 1.25,
+            acceleration_m_per_s2: 15.0,
+            settle_limit_secs: 3.0,
+        }
     }
 }
 
@@ -33,10 +50,13 @@ impl SimulationConfig {
     ///
     /// [`SimError::Config`] for the first setting that is not allowed.
     pub fn check(&self) -> Result<(), SimError> {
-        let Self { step_hz, frame_hz, speed_m_per_s, acceleration_m_per_s2, settle_limit_secs } = self;
+        let Self { robot, layout, step_hz, frame_hz, speed_m_per_s, acceleration_m_per_s2, settle_limit_secs } = self;
         let wrong =
             |key, found: String, allowed: &str| Err(SimError::Config { key, found, allowed: allowed.to_owned() });
         let positive = |value: f32, most: f32| value > 0.0 && value <= most;
+        if *layout == Some(Layout::Table) && robot.layout() == Layout::Bench {
+            return wrong("layout", "table".to_owned(), "bench, where the arm reaches everything");
+        }
         if !(120..=2000).contains(step_hz) {
             return wrong("step_hz", step_hz.to_string(), "120 to 2000");
         }
@@ -53,6 +73,11 @@ impl SimulationConfig {
             return wrong("settle_limit_secs", settle_limit_secs.to_string(), "above 0, at most 60");
         }
         Ok(())
+    }
+
+    /// How things are laid out.
+    pub fn layout(&self) -> Layout {
+        self.layout.unwrap_or_else(|| self.robot.layout())
     }
 
     /// The longest wait for rest, in steps.

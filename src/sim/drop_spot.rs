@@ -7,7 +7,7 @@ use rapier3d::geometry::SharedShape;
 
 use crate::geometry::Vec3;
 use crate::scene::{BodyIndex, Scene, Shape};
-use crate::sim::gripper::{Gripper, MAX_OPENING_M, OPEN_REACH_M, PALM_HALF_X_M, reach_m};
+use crate::sim::gripper::{Gripper, MAX_OPENING_M, reach_m};
 use crate::sim::motion::Tool;
 use crate::sim::sweep::AtStart;
 use crate::sim::world::World;
@@ -64,7 +64,7 @@ pub(super) fn choose(scene: &Scene, world: &World, gripper: &Gripper, container:
     let spots: Vec<Vector> = match scene.body(container).shape {
         Shape::OpenBox { inner_m: [x, y, _], .. } => {
             let load = scene.body(held.body).shape.half_extents_m();
-            let room = free_half_widths_m([x, y], &load);
+            let room = free_half_widths_m([x, y], gripper.half_widths_m(), &load);
             let spot = |[part_x, part_y]: [f32; 2]| Vector::new(part_x * room[0], part_y * room[1], 0.0);
             SPOTS.iter().map(|&parts| over(&in_world, spot(parts), &tool)).collect()
         }
@@ -102,9 +102,9 @@ fn bowl_spots(world: &World, gripper: &Gripper, floor_radius_m: f32) -> impl Ite
     std::iter::once(0.0).chain(offsets).map(move |number| across * (number * spacing_m))
 }
 
-fn free_half_widths_m([x, y]: [f32; 2], load: &Vec3) -> [f32; 2] {
+fn free_half_widths_m([x, y]: [f32; 2], [hand_x, hand_y]: [f32; 2], load: &Vec3) -> [f32; 2] {
     let side = load.x.max(load.y);
-    [x - side.max(PALM_HALF_X_M) - WALL_MARGIN_M, y - side.max(OPEN_REACH_M) - WALL_MARGIN_M].map(|room| room.max(0.0))
+    [x - side.max(hand_x) - WALL_MARGIN_M, y - side.max(hand_y) - WALL_MARGIN_M].map(|room| room.max(0.0))
 }
 
 /// How far what is held can go down from a spot.

@@ -15,6 +15,7 @@ use rapier3d::math::{Pose as EnginePose, Vector};
 use rapier3d::parry::query::distance;
 use rapier3d::parry::shape::Cuboid;
 
+use crate::arm::Load;
 use crate::scene::{BodyIndex, Scene};
 use crate::sim::motion::Tool;
 use crate::sim::sweep::AtStart;
@@ -31,9 +32,9 @@ const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, (TIP_M + PALM_M) / 2.0];
 const PALM_HALF_M: [f32; 3] = [0.013, 0.044, 0.008];
 const FINGER_FRICTION: f32 = 0.6;
 /// From the gripper's axis to a fully open finger's outer side, in metres.
-pub(super) const OPEN_REACH_M: f32 = reach_m(MAX_OPENING_M);
+const OPEN_REACH_M: f32 = reach_m(MAX_OPENING_M);
 /// Half of the palm's width along the fingers' flat side, in metres.
-pub(super) const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
+const PALM_HALF_X_M: f32 = PALM_HALF_M[0];
 /// How far a held body may shift before it counts as lost, in metres.
 const SLIP_M: f32 = 0.005;
 /// The most that the fingers hold, in newtons. A block weighs 0.6.
@@ -68,7 +69,16 @@ pub(super) struct Gripper {
     palm: RigidBodyHandle,
     fingers: [RigidBodyHandle; 2],
     engine: Engine,
+    /// What an arm has above the palm, as shapes about the gripper's reference point.
+    above: Vec<(SharedShape, EnginePose)>,
 }
+
+/// The body of an arm's gripper, which is along the fingers' closing, and the end of its wrist: from the reference point
+/// up, half of its length, its radius.
+const BODY_M: [f32; 3] = [0.0701, 0.022, 0.029];
+const WRIST_M: [f32; 3] = [0.1221, 0.0, 0.045];
+/// Height of all that is above the reference point, in metres.
+const HAND_M: f32 = 0.1;
 
 /// From the gripper's axis to a finger's outer side, in metres.
 pub(super) const fn reach_m(opening_m: f32) -> f32 {
@@ -88,7 +98,40 @@ impl Gripper {
         };
         let palm = insert(PALM_HALF_M, palm_in_world(&tool));
         let fingers = SIDES.map(|side| insert(FINGER_HALF_M, finger_in_world(&tool, side)));
-        Self { tool, held: None, opens_to_m: MAX_OPENING_M, palm, fingers, engine: Engine::Current }
+        Self { tool, held: None, opens_to_m: MAX_OPENING_M, palm, fingers, engine: Engine::Current, above: Vec::new() }
+    }
+
+    /// The same below an arm: its body and the arm's wrist must pass too.
+    pub(super) fn below_arm(mut self) -> Self {
+        let [body_z, half_m, radius_m] = BODY_M;
+        let body = SharedShape::capsule_y(half_m, radius_m);
+        let [wrist_z, _, wrist_radius_m] = WRIST_M;
+        let at = |z| EnginePose::translation(0.0, 0.0, z);
+        self.above = vec![(body, at(body_z)), (SharedShape::ball(wrist_radius_m), at(wrist_z))];
+        self
+    }
+
+    /// Half of what the gripper needs between walls: across the fingers' closing, and along it with them open.
+    pub(super) fn half_widths_m(&self) -> [f32; 2] {
+        if self.above.is_empty() {
+            return [PALM_HALF_X_M, OPEN_REACH_M];
+        }
+        [WRIST_M[2].max(PALM_HALF_X_M), (BODY_M[1] + BODY_M[2]).max(OPEN_REACH_M)]
+    }
+
+    /// Gripper and what it holds as an upright cylinder.
+    pub(super) fn load(&self, world: &World) -> Load {
+        let place = self.tool.position;
+        let parts = self.carried(world, &self.tool);
+        let bounds = parts.iter().map(|(shape, pose)| shape.compute_aabb(pose));
+        let [x, y] = self.half_widths_m();
+        let hand_m = Vector::new(x, y, 0.0).length();
+        let radius_m = bounds.fold(hand_m, |radius_m, bounds| {
+            let far = (bounds.mins - place).abs().max((bounds.maxs - place).abs());
+            radius_m.max(Vector::new(far.x, far.y, 0.0).length())
+        });
+        let below_m = place.z - self.lowest_z(world);
+        Load { radius_m: f64::from(radius_m), below_m: f64::from(below_m), above_m: f64::from(HAND_M) }
     }
 
     /// Moves in free flight; see the module.
@@ -232,7 +275,8 @@ impl Gripper {
     /// when it meets nothing.
     pub(super) fn free_way_m(&self, world: &World, tool: &Tool, path: Vector, at_start: AtStart) -> f32 {
         let held = self.held_handle();
-        let parts = hull(tool, self.opens_to_m).into_iter().chain(self.carried(world, tool));
+        let above = self.above.iter().map(|(shape, pose)| (shape.clone(), tool.in_world() * *pose));
+        let parts = hull(tool, self.opens_to_m).into_iter().chain(above).chain(self.carried(world, tool));
         parts.filter_map(|(shape, from)| world.cast(&*shape, &from, path, at_start, held)).fold(path.length(), f32::min)
     }
 }

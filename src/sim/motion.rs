@@ -61,6 +61,11 @@ impl Motion {
         Self { from, to, n_steps: (duration_secs * config.step_hz as f32).ceil() as u32 }
     }
 
+    /// The same motion in so many steps.
+    pub(super) fn in_steps(self, n_steps: u32) -> Self {
+        Self { n_steps, ..self }
+    }
+
     /// Where the gripper is after `step` of the `n_steps` steps.
     pub(super) fn at(&self, step: u32) -> Tool {
         if step >= self.n_steps {

@@ -16,7 +16,7 @@ use rapier3d::geometry::{
     Collider, ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, Ray,
 };
 use rapier3d::math::{Pose as EnginePose, Vector};
-use rapier3d::parry::bounding_volume::BoundingVolume as _;
+use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume as _};
 use rapier3d::parry::shape::Shape as EngineShape;
 use rapier3d::pipeline::{PhysicsWorld, QueryFilter, QueryPipeline};
 
@@ -47,6 +47,8 @@ const FRICTION: f32 = 0.7;
 const ANGULAR_DAMPING: f32 = 4.0;
 const BALL_ANGULAR_DAMPING: f32 = 40.0;
 const TABLE_HALF_THICKNESS_M: f32 = 0.02;
+/// Floor and walls of an open box.
+const N_OPEN_BOX_PARTS: usize = 5;
 /// Where what falls off the table comes to rest.
 const GROUND_Z_M: f32 = -0.4;
 const GROUND_HALF_M: f32 = 5.0;
@@ -174,6 +176,21 @@ impl World {
         let others = self.bodies.iter().filter(|&&handle| Some(handle) != except);
         let colliders = others.flat_map(|&handle| self.engine.bodies[handle].colliders());
         colliders.map(|&collider| self.engine.colliders[collider].compute_aabb().maxs.z).fold(0.0, f32::max)
+    }
+
+    /// Boxes around everything but `except`: one a body, of a box without lid one a wall.
+    pub(super) fn boxes(&self, except: Option<RigidBodyHandle>) -> impl Iterator<Item = Aabb> {
+        let others = self.bodies.iter().filter(move |&&handle| Some(handle) != except);
+        others.flat_map(|&handle| {
+            let colliders = self.engine.bodies[handle].colliders().iter();
+            let boxes = colliders.map(|&collider| &self.engine.colliders[collider]).map(Collider::compute_aabb);
+            let boxes: Vec<Aabb> = boxes.collect();
+            // What is round is many small parts.
+            match boxes.len() {
+                0..=N_OPEN_BOX_PARTS => boxes,
+                _ => boxes.into_iter().reduce(|a, b| a.merged(&b)).into_iter().collect(),
+            }
+        })
     }
 
     /// The first thing straight below a point.

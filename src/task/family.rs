@@ -15,7 +15,8 @@ pub use spec::{Bodies, FrontView, Room, SlotKind};
 use std::ops::Range;
 
 use crate::program::{KnownPrograms, Program};
-use crate::scene::SlotIndex;
+use crate::scene::{Scene, SlotIndex};
+use crate::task::Layout;
 
 /// The enum, and the file of each family.
 macro_rules! families {
@@ -159,8 +160,16 @@ impl Family {
     }
 
     /// Where a camera in front stands.
-    pub fn front_view(self) -> FrontView {
-        self.spec().front_view
+    pub fn front_view(self, layout: Layout) -> FrontView {
+        match layout {
+            Layout::Table => self.spec().front_view,
+            Layout::Bench => self.spec().bench.front_view,
+        }
+    }
+
+    /// The layout that a scene of the family has: its table tells.
+    pub fn layout_of(self, scene: &Scene) -> Layout {
+        if scene.table_half_m == self.spec().bench.table_half_m { Layout::Bench } else { Layout::Table }
     }
 }
 

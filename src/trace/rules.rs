@@ -23,6 +23,8 @@ pub enum TraceError {
     ForeignBody { frame: usize, slot: usize, body: u16 },
     #[error("frame {frame}: a pose is not finite")]
     NotFinite { frame: usize },
+    #[error("frame {frame}: it tells joints and the first frame does not, or the other way round")]
+    Joints { frame: usize },
     #[error("frame {frame}: body {body} is held, but the scene has {bodies} bodies")]
     HeldBody { frame: usize, body: u16, bodies: usize },
     #[error("slot {slot} may show body {body}, but the scene has {bodies} bodies")]
@@ -113,6 +115,10 @@ pub(super) fn check_frames(scene: &Scene, frames: &[Frame]) -> Result<(), TraceE
             return Err(TraceError::TimeNotIncreasing { frame: frame + 1 });
         }
     }
+    let has_joints = |frame: &Frame| frame.state.joints_rad.is_some();
+    if let Some(frame) = frames.iter().position(|frame| has_joints(frame) != has_joints(first)) {
+        return Err(TraceError::Joints { frame });
+    }
     frames.iter().enumerate().try_for_each(|(frame, value)| check_frame(scene, frame, value))
 }
 
@@ -133,7 +139,8 @@ fn check_frame(scene: &Scene, frame: usize, value: &Frame) -> Result<(), TraceEr
         return Err(TraceError::HeldBody { frame, body: body.0, bodies: n_bodies });
     }
     let all_finite = poses.iter().fold(is_finite(&value.state.gripper_in_world), |all, pose| all & is_finite(pose));
-    if !all_finite {
+    let are_joints_finite = value.state.joints_rad.is_none_or(|joints| joints.iter().all(|angle| angle.is_finite()));
+    if !(all_finite && are_joints_finite) {
         return Err(TraceError::NotFinite { frame });
     }
     Ok(())

@@ -49,7 +49,7 @@ impl Film {
     ///
     /// When the encoder cannot be made.
     pub fn begin(&mut self, family: Family, scene: &Scene, seed: Seed) -> Result<(), VideoError> {
-        self.camera = self.config.camera(family, seed);
+        self.camera = self.config.camera_of(family, family.layout_of(scene), seed);
         self.has_seen_a_body = false;
         self.renderer.set_look(self.config.look(scene, seed));
         self.encoder = match self.config.format {

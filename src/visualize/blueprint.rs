@@ -8,7 +8,7 @@ use rerun::external::re_sdk_types::blueprint::components::BackgroundKind;
 
 use crate::visualize::layout::{Layout, Node};
 use crate::visualize::store::Store;
-use crate::visualize::{Replay, VisualizeError, agreement, clock, palette, pictures, series, specification};
+use crate::visualize::{Replay, VisualizeError, agreement, arm, clock, palette, pictures, series, specification};
 
 /// The blueprint for some replays: one for all, since Rerun has one an application.
 pub(super) fn blueprint(replays: &[Replay<'_>]) -> Result<Store, VisualizeError> {
@@ -94,12 +94,23 @@ fn right(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Node, VisualizeE
         let (ends, program) = ("probability/end_of_program", "probability/program");
         parts.push(layout.plot("Probability that the caller ends", ends, Some([-0.05, 1.05]))?);
         let chosen = layout.plot("Probability of the chosen program", program, Some([-0.05, 1.05]))?;
-        parts.push(layout.split(ContainerKind::Tabs, &[chosen, distance], &[])?);
+        let mut numbers = vec![chosen, distance];
+        numbers.extend(joints(layout, replays)?);
+        parts.push(layout.split(ContainerKind::Tabs, &numbers, &[])?);
     } else {
-        parts.push(distance);
+        match joints(layout, replays)? {
+            None => parts.push(distance),
+            Some(joints) => parts.push(layout.split(ContainerKind::Tabs, &[distance, joints], &[])?),
+        }
     }
     let shares: &[f32] = if parts.len() > 3 { &[0.32, 0.28, 0.2, 0.2] } else { &[0.38, 0.34, 0.28] };
     layout.split(ContainerKind::Vertical, &parts, shares)
+}
+
+/// The plot of an arm's joints, where a robot has one.
+fn joints(layout: &mut Layout, replays: &[Replay<'_>]) -> Result<Option<Node>, VisualizeError> {
+    let has_arm = replays.iter().any(|replay| arm::is_there(replay.episode));
+    has_arm.then(|| layout.plot("Joints (rad)", "joints", None)).transpose()
 }
 
 /// Looks at the whole table from in front and above.

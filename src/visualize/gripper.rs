@@ -6,7 +6,7 @@ use rerun::components::FillMode;
 use crate::trace::{Episode, Frame};
 use crate::visualize::store::Store;
 use crate::visualize::world::put_poses;
-use crate::visualize::{VisualizeError, clock, palette};
+use crate::visualize::{VisualizeError, arm, clock, palette};
 
 /// Half of a finger's width, thickness and length, in metres; these and the palm's are the simulated gripper's.
 const FINGER_HALF_M: [f32; 3] = [0.009, 0.003, 0.0215];
@@ -22,8 +22,12 @@ pub(super) fn put(store: &mut Store, episode: &Episode) -> Result<(), VisualizeE
     put_poses(store, "world/gripper", episode, |frame| frame.state.gripper_in_world)?;
     let palm_z = finger_z() + FINGER_HALF_M[2] + PALM_HALF_M[2];
     let stem_z = palm_z + PALM_HALF_M[2] + STEM_HALF_M[2];
+    // Below an arm there is no stem.
+    let n_boxes = if arm::is_there(episode) { 1 } else { 2 };
+    let centers = [[0.0, 0.0, palm_z], [0.0, 0.0, stem_z]];
+    let half_sizes = [PALM_HALF_M, STEM_HALF_M];
     let palm =
-        Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, palm_z], [0.0, 0.0, stem_z]], [PALM_HALF_M, STEM_HALF_M])
+        Boxes3D::from_centers_and_half_sizes(centers.into_iter().take(n_boxes), half_sizes.into_iter().take(n_boxes))
             .with_colors([palette::color(palette::GRIPPER)])
             .with_fill_mode(FillMode::Solid);
     store.put_static("world/gripper/palm", &palm)?;

@@ -11,6 +11,8 @@ pub(super) const SKY: [u8; 3] = [28, 32, 38];
 pub(super) const TABLE: [u8; 3] = [122, 112, 100];
 /// Of the gripper.
 pub(super) const GRIPPER: [u8; 3] = [176, 184, 194];
+/// Of an arm.
+pub(super) const ARM: [u8; 3] = [150, 48, 52];
 /// Of fingers that hold something.
 pub(super) const HOLDING: [u8; 3] = [120, 214, 120];
 /// Of the mark around what `move_to` goes to.

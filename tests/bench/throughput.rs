@@ -11,6 +11,7 @@ use std::process::Command;
 use burn::tensor::Device;
 use cpu_time::ProcessTime;
 use mimalloc::MiMalloc;
+use ntp::arm::{Upright, Vector, solutions};
 use ntp::dataset::{
     ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, TrialData, TrialSpool, convert, read_trials,
 };
@@ -20,10 +21,11 @@ use ntp::model::{
 };
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
+use ntp::robot::{Action, RobotApi as _, RobotKind};
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
-use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state, sample, scene};
+use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state_on, sample, scene_on};
 use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
 use ntp::training::{Hooks, Source, TrainConfig, Training, TrialStream, train, train_from};
 
@@ -71,6 +73,10 @@ fn main() {
     }
     if ["generate_stacking_video_64", "convert_images_64", "load_images_64", "load_video_64"].into_iter().any(wanted) {
         bench.videos();
+    }
+    if ["arm_inverse_us", "arm_plan_us", "generate_stacking_arm"].into_iter().any(wanted) {
+        arm_inverse();
+        arm();
     }
     if wanted("train_convolutions_64") {
         train_convolutions();
@@ -199,10 +205,78 @@ fn trial(task: &Task, index: u32, count: u16) -> Trial {
 }
 
 fn world(task: &Task, trial: &Trial, frame_hz: u32) -> Simulation {
-    let scene = scene(task.family, &trial.counts);
-    let initial = initial_state(task.family, &scene, trial.seed);
-    let config = SimulationConfig { frame_hz, ..SimulationConfig::default() };
-    Simulation::new(scene, &initial, &config).expect("a drawn start is allowed")
+    world_of(task, trial, &SimulationConfig { frame_hz, ..SimulationConfig::default() })
+}
+
+fn world_of(task: &Task, trial: &Trial, config: &SimulationConfig) -> Simulation {
+    let scene = scene_on(config.layout(), task.family, &trial.counts);
+    let initial = initial_state_on(config.layout(), task.family, &scene, trial.seed);
+    Simulation::new(scene, &initial, config).expect("a drawn start is allowed")
+}
+
+/// All postures of 100 000 places over a table, in closed form.
+fn arm_inverse() {
+    const N_PLACES: u32 = 100_000;
+    let place = |number: u32| {
+        let share = |factor: u32| f64::from(number.wrapping_mul(factor) % 10_007) / 10_007.0;
+        let position = Vector::new(0.35 + 0.4 * share(7919), 0.8 * share(104_729) - 0.4, 0.3 * share(1_299_709));
+        Upright { position, yaw_rad: share(611_953) - 0.5 }
+    };
+    let places: Vec<Upright> = (0..N_PLACES).map(place).collect();
+    let (n_found, secs) = cpu_secs(|| places.iter().map(|place| solutions(place).count()).sum::<usize>());
+    report("arm_inverse_us", secs / f64::from(N_PLACES) * 1e6, "CPU-microseconds a place, all postures");
+    report("arm_inverse_postures", n_found as f64 / f64::from(N_PLACES), "postures a place");
+}
+
+/// Demonstrations of 100 tasks by the arm, and how long the plan of each `move_to` takes.
+fn arm() {
+    let tasks = stacking_tasks();
+    let config = SimulationConfig { robot: RobotKind::Sawyer, ..SimulationConfig::default() };
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let n_episodes = 100_u64;
+    let seen: Vec<&Task> = tasks.of_split(Split::Seen).collect();
+    let (failed, secs) = cpu_secs(|| {
+        let mut failed = 0;
+        let mut writer = ShardWriter::create(&folder.path().join("arm.mcap"), "{}").expect("the folder can be written");
+        for index in 0..n_episodes {
+            let task = seen[index as usize % seen.len()];
+            let provenance = Provenance::new(task, &trial(task, 0, 1), Actor::Expert, index);
+            let mut world = world_of(task, &trial(task, 0, 1), &config);
+            let episode = demonstrate(task, &mut world, provenance).expect("the trace is right");
+            failed += u64::from(!episode.outcome.is_success());
+            writer.write(&episode).expect("the recording can be written");
+        }
+        writer.finish().expect("the recording can be written");
+        failed
+    });
+    report("generate_stacking_arm", n_episodes as f64 / secs, "demonstrations per CPU-second");
+    report("generate_stacking_arm_success", 1.0 - failed as f64 / n_episodes as f64, "share");
+    let mut plans = Vec::new();
+    for task in &seen {
+        plan_all(task, &config, &mut plans);
+    }
+    plans.sort_by(f64::total_cmp);
+    let at = |share: f64| plans[((plans.len() - 1) as f64 * share) as usize] * 1e6;
+    report("arm_plan_us", at(0.5), "CPU-microseconds a primitive, median");
+    report("arm_plan_us_99", at(0.99), "CPU-microseconds a primitive, 99 %");
+    report("arm_plan_us_most", at(1.0), "CPU-microseconds a primitive, most");
+}
+
+/// Acts a task and times the plan of each `move_to` before it is made.
+fn plan_all(task: &Task, config: &SimulationConfig, plans: &mut Vec<f64>) {
+    let mut world = world_of(task, &trial(task, 1, 1), config);
+    for goal in &task.goals {
+        for (slot, then) in [(goal.source, Action::Grip), (goal.target, Action::Release)] {
+            let (planned, secs) = cpu_secs(|| (0..10).map(|_| world.planned_stretches(slot)).next_back());
+            plans.push(secs / 10.0);
+            if planned.is_some_and(|planned| planned.is_err()) || world.act(Action::MoveTo(slot)).is_err() {
+                return;
+            }
+            if world.act(then).is_err() {
+                return;
+            }
+        }
+    }
 }
 
 fn demonstration(task: &Task, trial: &Trial, index: u64, frame_hz: u32) -> Episode {

@@ -9,6 +9,7 @@ const ORDER: &[&str] = &[
     "feature",
     "geometry",
     "seed",
+    "arm",
     "scene",
     "program",
     "artifact",

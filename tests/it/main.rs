@@ -3,6 +3,10 @@
 #[cfg(test)]
 mod architecture;
 #[cfg(test)]
+mod arm;
+#[cfg(test)]
+mod arm_pipeline;
+#[cfg(test)]
 mod artifact;
 #[cfg(test)]
 mod cli;

@@ -20,6 +20,7 @@ fn cube_scene() -> (Scene, SceneState) {
         opening_m: 0.07,
         held: None,
         bodies_in_world: vec![upright(Vec3::new(0.0, 0.0, 0.05), 0.0)],
+        joints_rad: None,
     };
     (scene, state)
 }

@@ -1,6 +1,7 @@
 //! The world in physics: motions, grasps, falls, piles, and that all of it repeats to the bit.
 
 mod adversary;
+mod arm;
 mod cleanup;
 mod contract;
 mod rates;

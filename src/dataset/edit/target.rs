@@ -24,6 +24,7 @@ use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
 use crate::dataset::statistics::batches::{flags, lists, numeric_features, values};
 use crate::dataset::statistics::{NumericFeature, Statistics};
 use crate::dataset::tables::episodes::read::EpisodeRow;
+use crate::dataset::tables::frames::feature::action_of;
 use crate::dataset::tables::frames::write::FrameRows;
 use crate::dataset::write::sheaf::{EPISODE_GROUP_ROWS, GROUP_ROWS, MEGABYTE, SCOPE_GROUP_ROWS};
 use crate::table::{BatchWriter, TableSchema, TextTable, WriteOptions};
@@ -132,7 +133,12 @@ impl Target {
             scopes: Renumbered::new(["episode_index"]),
             meta: Renumbered::new(META_NUMBERS),
             provenance: Renumbered::new(PROVENANCE_NUMBERS),
-            frame_files: rolling(layout::DATA, FRAMES, &cursors.frames, FrameRows::options(ntp.n_slots)),
+            frame_files: rolling(
+                layout::DATA,
+                FRAMES,
+                &cursors.frames,
+                FrameRows::options(ntp.n_slots, action_of(&info)),
+            ),
             call_files: rolling(layout::CALLS, CALLS, &cursors.calls, CALLS.options()),
             scope_files: rolling(layout::SCOPES, SCOPES, &cursors.scopes, SCOPES.options()),
             meta_files: rolling(layout::META_EPISODES, META_EPISODES, &cursors.meta, META_EPISODES.options()),

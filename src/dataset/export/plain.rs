@@ -16,6 +16,7 @@ use crate::dataset::export::ExportSummary;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
+use crate::dataset::tables::frames::feature::action_of;
 use crate::dataset::tables::frames::write::FrameRows;
 use crate::table::{BatchReader, BatchWriter, WriteOptions};
 
@@ -38,7 +39,7 @@ pub(super) fn write_frames(
 ) -> Result<(Info, u64), EditError> {
     let mut info: Info = read_json(&root.join(layout::INFO))?;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
-    copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots), change)?;
+    copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots, action_of(&info)), change)?;
     copy_folder(&root.join(layout::VIDEOS), &to.join(layout::VIDEOS))?;
     info.features.0.retain(|(name, _)| !is_ours(name));
     info.features.0.extend(further);

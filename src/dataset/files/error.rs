@@ -40,6 +40,18 @@ pub enum ConvertError {
         /// Slots of the episode.
         found: usize,
     },
+    /// All episodes of a dataset are of robots with an arm's joints, or of robots without.
+    #[error("episode {episode}: its robot has joints and those before it have none, or the other way round")]
+    Joints {
+        /// The episode's number in its recordings.
+        episode: u64,
+    },
+    /// Targets for joints are asked for where there are none.
+    #[error("episode {episode} has no joints; action = \"joints\" is allowed for recordings of an arm")]
+    NoJoints {
+        /// The episode's number in its recordings.
+        episode: u64,
+    },
     /// Pictures of a camera cannot be taken over.
     #[error("episode {episode}, camera {camera}: {problem}")]
     Pictures {

@@ -11,7 +11,7 @@ use crate::dataset::files::info::{Dtype, Info, LEROBOT_VERSION, NTP_VERSION, Ntp
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::dataset::statistics::FeatureStatistics;
-use crate::dataset::tables::frames::feature::{FEATURES, Feature};
+use crate::dataset::tables::frames::feature::{FEATURES, Feature, known};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};
 use crate::dataset::{DatasetError, EpisodePictures};
 use crate::program::KnownPrograms;
@@ -76,7 +76,7 @@ fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validati
             Some(_) => {}
         }
     }
-    let known: BTreeSet<_> = FEATURES.iter().map(|feature| feature.name).collect();
+    let known: BTreeSet<_> = known().map(|feature| feature.name).collect();
     let is_picture = |name: &&str| declared.get(name).is_some_and(|of| matches!(of.dtype, Dtype::Image | Dtype::Video));
     for name in declared.keys().filter(|name| !known.contains(*name) && !is_picture(name)) {
         validation.warn(
@@ -241,10 +241,9 @@ pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &
                 continue;
             }
         };
-        let known = |name: &&str| {
-            FEATURES.iter().any(|feature| feature.name == *name) || images.iter().any(|image| image == name)
-        };
-        if let Some(name) = reader.file_columns().find(|name| !known(name)) {
+        let is_known =
+            |name: &&str| known().any(|feature| feature.name == *name) || images.iter().any(|image| image == name);
+        if let Some(name) = reader.file_columns().find(|name| !is_known(name)) {
             let message = format!("column {name:?} is not declared in {}", layout::INFO);
             validation.error("file.undeclared", path, String::new(), message);
         }

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::arm;
 use crate::artifact::write_json;
 use crate::dataset::ConvertError;
-use crate::dataset::config::ConvertConfig;
+use crate::dataset::config::{ActionChoice, ConvertConfig};
 use crate::dataset::files::info::{Info, NTP_VERSION, NtpInfo, Stats, Totals};
 use crate::dataset::files::layout;
 use crate::dataset::files::rolling::Rolling;
@@ -13,7 +14,7 @@ use crate::dataset::pictures::PictureFeatures;
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, META_EPISODES, SCOPES};
 use crate::dataset::statistics::{NumericFeature, Statistics};
 use crate::dataset::tables::frames::feature::declared;
-use crate::dataset::tables::frames::write::{EpisodeIds, FrameRows};
+use crate::dataset::tables::frames::write::{EpisodeIds, FrameRows, has_joints};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 use crate::dataset::tables::view::{EpisodePlaces, EpisodeView, Source};
 use crate::dataset::tables::{calls, episodes, meta_episodes, scopes};
@@ -75,7 +76,13 @@ impl Tables {
         let pictures = PictureFeatures::new(root, config, cameras);
         let n_slots = first.scene.slots.len();
         let file_bytes = config.file_megabytes.get() as usize * MEGABYTE;
-        let data_options = WriteOptions { further: pictures.data_schema(), ..FrameRows::options(n_slots) };
+        let has_joints = has_joints(first);
+        if config.action == ActionChoice::Joints && !has_joints {
+            return Err(ConvertError::NoJoints { episode: first.provenance.index });
+        }
+        let frames = FrameRows::new(n_slots, config.action, has_joints);
+        let further = frames.further().into_iter().chain(pictures.data_schema()).collect();
+        let data_options = WriteOptions { further, ..FrameRows::options(n_slots, config.action) };
         let meta_options = WriteOptions { further: pictures.meta_schema(), ..META_EPISODES.options() };
         let rolling = |folder, schema, options| rolling(root, folder, schema, options, file_bytes);
         Ok(Self {
@@ -83,12 +90,12 @@ impl Tables {
             slots: first.scene.slots.iter().map(|slot| slot.name.clone()).collect(),
             families: BTreeSet::new(),
             tasks: TextTable::default(),
-            frames: FrameRows::new(n_slots),
+            frames,
             calls: calls::Rows::default(),
             scopes: scopes::Rows::default(),
             provenance: episodes::Rows::default(),
             meta: meta_episodes::Rows::default(),
-            statistics: Statistics::new(root, NumericFeature::all(n_slots)),
+            statistics: Statistics::new(root, NumericFeature::all(n_slots, config.action, has_joints)),
             data_files: rolling(layout::DATA, FRAMES, data_options),
             call_files: rolling(layout::CALLS, CALLS, CALLS.options()),
             scope_files: rolling(layout::SCOPES, SCOPES, SCOPES.options()),
@@ -148,6 +155,9 @@ impl Tables {
         }
         if slots.iter().zip(&self.slots).any(|(slot, known)| slot.name != *known) {
             self.slots = (0..self.n_slots).map(|slot| format!("slot_{slot}")).collect();
+        }
+        if !self.frames.fits(view.episode) {
+            return Err(ConvertError::Joints { episode: provenance.index });
         }
         self.families.insert(provenance.family);
         Ok(())
@@ -216,8 +226,13 @@ impl Tables {
         write_subtasks(root, self.frames.subtasks())?;
         let tasks = self.tasks.texts().len() as u64;
         let totals = Totals { episodes: self.n_episodes, frames: self.n_frames, tasks };
-        let mut info = Info::new(totals, declared(&self.slots), config.fps.get(), config.file_megabytes.get());
+        let mut info =
+            Info::new(totals, declared(&self.slots, config.action), config.fps.get(), config.file_megabytes.get());
+        info.features.0.extend(self.frames.declared_further(&self.slots));
         info.features.0.extend(self.pictures.declared());
+        if self.frames.has_joints() {
+            info.robot_type = arm::NAME.to_owned();
+        }
         write_json(&root.join(layout::INFO), &info)?;
         write_json(&root.join(layout::NTP_INFO), &self.ntp_info(config, failed_left_out))?;
         let Self { n_episodes, n_frames, n_calls, n_scopes, n_failed, statistics, pictures, .. } = self;

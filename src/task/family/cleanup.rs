@@ -15,7 +15,7 @@ use crate::geometry::{Pose, Vec3, upright};
 use crate::program::Program;
 use crate::scene::{Body, BodyIndex, Bowl, Mobility, Scene, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
-use crate::task::family::spec::{Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
+use crate::task::family::spec::{Bench, Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
 use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
 
 pub(super) static SPEC: FamilySpec = FamilySpec {
@@ -47,6 +47,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
     sampler: Sampler { limits: |_pool, _train| (N_TRAINING, N_UNSEEN), all_seen: None, sample },
     scene,
     poses,
+    bench: BENCH,
 };
 
 /// How many bowls there are, asked for or not.
@@ -95,6 +96,27 @@ const TRAY_JITTER_M: [f32; 2] = [0.25, 0.03];
 const ASIDE_X_M: f32 = 0.8;
 const ASIDE_PITCH_M: f32 = 0.2;
 
+/// Before the arm, whose base is at x = -0.62: two arcs of cells about the base, each cell as far from the next as on
+/// the table, and the tray beside the base.
+const BENCH: Bench = Bench {
+    table_half_m: [0.95, 0.75],
+    poses: bench_poses,
+    front_view: FrontView { eye_m: [0.05, -2.0, 1.7], target_m: [-0.2, 0.02, 0.1] },
+};
+const BENCH_BASE_X_M: f32 = -0.62;
+/// Of an arc: radius, how many cells, and how far they are apart in degrees.
+const BENCH_ARCS: [(f32, u8, f32); 2] = [(0.51, 6, 23.0), (0.71, 9, 16.5)];
+const BENCH_TRAY_M: [f32; 2] = [-0.775, 0.58];
+const BENCH_TRAY_JITTER_M: [f32; 2] = [0.015, 0.015];
+const BENCH_ASIDE_X_M: f32 = 0.75;
+
+/// A cell that a bowl or four forks start in.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    middle_m: [f32; 2],
+    turn_rad: f32,
+}
+
 /// The scene for 1 or 0 of each bowl (1 when it is asked for) and a number of forks; what is left out is 1.
 fn scene(counts: &[u16]) -> Scene {
     let count = |slot: SlotIndex| counts.get(usize::from(slot.0)).copied().unwrap_or(1);
@@ -133,12 +155,39 @@ fn scene(counts: &[u16]) -> Scene {
 /// Random poses: bowls in cells of their own, forks four in a cell, the tray behind them.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
     let [columns, rows] = CELLS;
-    let mut cells: Vec<[f32; 2]> =
-        (0..columns * rows).map(|cell| cell_middle([cell % columns, cell / columns])).collect();
+    let cell = |cell| Cell { middle_m: cell_middle([cell % columns, cell / columns]), turn_rad: 0.0 };
+    let cells = (0..columns * rows).map(cell).collect();
+    scattered_over(scene, cells, ([0.0, TRAY_Y_M], TRAY_JITTER_M), ASIDE_X_M, rng)
+}
+
+/// The same before an arm.
+fn bench_poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
+    let arc = |(radius_m, count, apart_deg): (f32, u8, f32)| {
+        (0..count).map(move |number| {
+            let turn_rad = ((f32::from(number) - f32::from(count - 1) / 2.0) * apart_deg).to_radians();
+            let (sin, cos) = libm::sincosf(turn_rad);
+            Cell { middle_m: [BENCH_BASE_X_M + radius_m * cos, radius_m * sin], turn_rad }
+        })
+    };
+    let cells = BENCH_ARCS.into_iter().flat_map(arc).collect();
+    scattered_over(scene, cells, (BENCH_TRAY_M, BENCH_TRAY_JITTER_M), BENCH_ASIDE_X_M, rng)
+}
+
+fn scattered_over(
+    scene: &Scene,
+    mut cells: Vec<Cell>,
+    (tray_m, tray_jitter_m): ([f32; 2], [f32; 2]),
+    aside_x_m: f32,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Pose> {
     cells.shuffle(rng);
     let (bowl_cells, fork_cells) = cells.split_at(usize::from(N_BOWLS));
     let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0_f32]];
-    let in_cell = |&[x, y]: &[f32; 2]| corners.map(|[a, b]| [x + FORK_PLACE_M * a, y + FORK_PLACE_M * b]);
+    let in_cell = |cell: &Cell| {
+        let [x, y] = cell.middle_m;
+        let (sin, cos) = libm::sincosf(cell.turn_rad);
+        corners.map(|[a, b]| [x + FORK_PLACE_M * (a * cos - b * sin), y + FORK_PLACE_M * (a * sin + b * cos)])
+    };
     let mut fork_places: Vec<[f32; 2]> = fork_cells.iter().flat_map(in_cell).collect();
     fork_places.shuffle(rng);
     let mut free_cells = bowl_cells.iter();
@@ -148,8 +197,8 @@ fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
         match (body.shape, body.mobility) {
             (Shape::Bowl(_), mobility) => {
                 let cell = free_cells.next().copied().unwrap_or_default();
-                let drawn = scattered(cell, z, BOWL_JITTER_M, BOWL_TURN_RAD, rng);
-                let aside = upright(Vec3::new(ASIDE_X_M, ASIDE_PITCH_M * (index as f32 - 2.0), z), 0.0);
+                let drawn = scattered(cell.middle_m, z, BOWL_JITTER_M, BOWL_TURN_RAD, rng);
+                let aside = upright(Vec3::new(aside_x_m, ASIDE_PITCH_M * (index as f32 - 2.0), z), 0.0);
                 if mobility == Mobility::Fixed { aside } else { drawn }
             }
             (_, Mobility::Movable) => {
@@ -157,8 +206,8 @@ fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
                 scattered(place, z, FORK_JITTER_M, std::f32::consts::FRAC_PI_2, rng)
             }
             (_, Mobility::Fixed) => {
-                let [x, y] = TRAY_JITTER_M.map(|reach| rng.random_range(-reach..reach));
-                upright(Vec3::new(x, TRAY_Y_M + y, z), 0.0)
+                let [x, y] = tray_jitter_m.map(|reach| rng.random_range(-reach..reach));
+                upright(Vec3::new(tray_m[0] + x, tray_m[1] + y, z), 0.0)
             }
         }
     };

@@ -16,7 +16,7 @@ use crate::geometry::{Pose, Vec3, upright};
 use crate::program::Program;
 use crate::scene::{Body, Mobility, Scene, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
-use crate::task::family::spec::{Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
+use crate::task::family::spec::{Bench, Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
 use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
 
 pub(super) static SPEC: FamilySpec = FamilySpec {
@@ -48,6 +48,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
     },
     scene,
     poses,
+    bench: BENCH,
 };
 
 const N_PARTS: usize = 6;
@@ -112,6 +113,17 @@ const CELLS: [usize; 2] = [5, 3];
 const CELL_M: f32 = 0.12;
 const CELLS_CENTER_Y_M: f32 = -0.2;
 const PART_JITTER_M: f32 = 0.012;
+
+/// Before the arm, whose base is at x = -0.62: parts in a field, a tray at either side.
+const BENCH: Bench = Bench {
+    table_half_m: [0.8, 0.65],
+    poses: bench_poses,
+    front_view: FrontView { eye_m: [0.1, -1.75, 1.4], target_m: [-0.2, 0.0, 0.15] },
+};
+const BENCH_CELLS: [usize; 2] = [3, 5];
+const BENCH_CENTER_X_M: f32 = -0.02;
+const BENCH_TRAY_X_M: f32 = -0.32;
+const BENCH_TRAY_Y_M: f32 = 0.47;
 
 /// The kind of part on each place, counted from 1; 0 where the kit leaves the place free.
 type Kit = [u16; N_PLACES];
@@ -183,21 +195,37 @@ fn scene(_counts: &[u16]) -> Scene {
 
 /// Random poses: parts in cells of their own, with any turn; either tray on either side.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
-    let [columns, rows] = CELLS;
+    let trays_m = [-TRAY_X_M, TRAY_X_M].map(|x| [x, TRAY_Y_M]);
+    scattered(scene, CELLS, [0.0, CELLS_CENTER_Y_M], trays_m, rng)
+}
+
+/// The same before an arm.
+fn bench_poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
+    let trays_m = [-BENCH_TRAY_Y_M, BENCH_TRAY_Y_M].map(|y| [BENCH_TRAY_X_M, y]);
+    scattered(scene, BENCH_CELLS, [BENCH_CENTER_X_M, 0.0], trays_m, rng)
+}
+
+fn scattered(
+    scene: &Scene,
+    [columns, rows]: [usize; 2],
+    [center_x, center_y]: [f32; 2],
+    trays_m: [[f32; 2]; 2],
+    rng: &mut ChaCha8Rng,
+) -> Vec<Pose> {
     let mut cells: Vec<[usize; 2]> = (0..columns * rows).map(|cell| [cell % columns, cell / columns]).collect();
     cells.shuffle(rng);
     let mut parts: Vec<Pose> = Vec::new();
     for (part, [column, row]) in scene.bodies.iter().take(N_PARTS).zip(cells) {
         let middle = |cell: usize, n_cells: usize| (cell as f32 - (n_cells - 1) as f32 / 2.0) * CELL_M;
         let mut jitter = || rng.random_range(-PART_JITTER_M..PART_JITTER_M);
-        let (x, y) = (middle(column, columns) + jitter(), middle(row, rows) + CELLS_CENTER_Y_M + jitter());
+        let (x, y) = (middle(column, columns) + center_x + jitter(), middle(row, rows) + center_y + jitter());
         let turn_rad = rng.random_range(-std::f32::consts::FRAC_PI_2..std::f32::consts::FRAC_PI_2);
         parts.push(upright(Vec3::new(x, y, part.shape.foot_m()), turn_rad));
     }
-    let mut sides = [-TRAY_X_M, TRAY_X_M];
+    let mut sides = trays_m;
     sides.shuffle(rng);
-    let trays = sides.map(|side_x| {
-        let [x, y] = [side_x, TRAY_Y_M].map(|middle| middle + rng.random_range(-TRAY_JITTER_M..TRAY_JITTER_M));
+    let trays = sides.map(|side| {
+        let [x, y] = side.map(|middle| middle + rng.random_range(-TRAY_JITTER_M..TRAY_JITTER_M));
         upright(Vec3::new(x, y, TRAY_HALF_M[2]), rng.random_range(-TRAY_TURN_RAD..TRAY_TURN_RAD))
     });
     let places = trays.iter().flat_map(|tray| {

@@ -13,7 +13,7 @@ use crate::geometry::{Pose, Vec3, upright};
 use crate::program::Program;
 use crate::scene::{Body, BodyIndex, Mobility, Scene, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
-use crate::task::family::spec::{Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
+use crate::task::family::spec::{Bench, Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
 use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
 
 pub(super) static SPEC: FamilySpec = FamilySpec {
@@ -44,6 +44,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
     sampler: Sampler { limits: |_pool, _train| (N_TRAINING, N_UNSEEN), all_seen: Some("training mappings"), sample },
     scene,
     poses,
+    bench: BENCH,
 };
 
 /// Cells that sorting objects start on, and their pitch.
@@ -56,6 +57,20 @@ const CONTAINER_Y_M: f32 = 0.34;
 const CONTAINER_PITCH_M: f32 = 0.26;
 const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
+
+/// Before the arm, whose base is at x = -0.62: objects in a field, containers at both sides, 0.6 m from the base's axis
+/// and 62 and 95 degrees off the way that it looks.
+const BENCH: Bench = Bench {
+    table_half_m: [0.85, 0.75],
+    poses: bench_poses,
+    front_view: FrontView { eye_m: [0.1, -1.9, 1.6], target_m: [-0.2, 0.0, 0.12] },
+};
+const BENCH_CELLS: [usize; 2] = [5, 8];
+const BENCH_PITCH_M: f32 = 0.075;
+const BENCH_CENTER_X_M: f32 = -0.015;
+/// Keeps any two objects at least 7 cm apart.
+const BENCH_JITTER_M: f32 = 0.0025;
+const BENCH_CONTAINERS_M: [[f32; 2]; 4] = [[-0.338, -0.53], [-0.672, -0.598], [-0.338, 0.53], [-0.672, 0.598]];
 
 /// The most instances of one category.
 const MAX_INSTANCES: u16 = 10;
@@ -101,25 +116,59 @@ fn scene(counts: &[u16]) -> Scene {
     Scene { bodies, slots, table_half_m: [0.6, 0.6] }
 }
 
+/// A field of cells that objects start in, and where containers stand.
+struct Field {
+    cells: [usize; 2],
+    pitch_m: f32,
+    center_m: [f32; 2],
+    jitter_m: f32,
+    containers_m: [[f32; 2]; 4],
+}
+
 /// Random poses: objects in cells of their own, containers in any order behind them.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
-    let [columns, rows] = OBJECT_CELLS;
+    let container_m = |column: f32| [column * CONTAINER_PITCH_M, CONTAINER_Y_M];
+    let field = Field {
+        cells: OBJECT_CELLS,
+        pitch_m: OBJECT_PITCH_M,
+        center_m: [0.0, OBJECT_CENTER_Y_M],
+        jitter_m: OBJECT_JITTER_M,
+        containers_m: [-1.5, -0.5, 0.5, 1.5].map(container_m),
+    };
+    scattered(scene, &field, rng)
+}
+
+/// Random poses before an arm: objects in cells of their own, containers in any order at both sides.
+fn bench_poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
+    let field = Field {
+        cells: BENCH_CELLS,
+        pitch_m: BENCH_PITCH_M,
+        center_m: [BENCH_CENTER_X_M, 0.0],
+        jitter_m: BENCH_JITTER_M,
+        containers_m: BENCH_CONTAINERS_M,
+    };
+    scattered(scene, &field, rng)
+}
+
+fn scattered(scene: &Scene, field: &Field, rng: &mut ChaCha8Rng) -> Vec<Pose> {
+    let [columns, rows] = field.cells;
     let mut cells: Vec<(usize, usize)> = (0..columns * rows).map(|cell| (cell % columns, cell / columns)).collect();
     cells.shuffle(rng);
     let mut places = [0_usize, 1, 2, 3];
     places.shuffle(rng);
     let mut free_cells = cells.into_iter();
     let mut free_places = places.into_iter();
-    let middle = |cell: usize, n_cells: usize| (cell as f32 - (n_cells - 1) as f32 / 2.0) * OBJECT_PITCH_M;
+    let middle = |cell: usize, n_cells: usize| (cell as f32 - (n_cells - 1) as f32 / 2.0) * field.pitch_m;
     let mut place = |body: &Body| match body.mobility {
         Mobility::Fixed => {
-            let column = free_places.next().unwrap_or(0) as f32 - 1.5;
-            Vec3::new(column * CONTAINER_PITCH_M, CONTAINER_Y_M, CONTAINER_WALL_M)
+            let [x, y] = field.containers_m[free_places.next().unwrap_or(0)];
+            Vec3::new(x, y, CONTAINER_WALL_M)
         }
         Mobility::Movable => {
             let (column, row) = free_cells.next().unwrap_or((0, 0));
-            let mut jitter = || rng.random_range(-OBJECT_JITTER_M..OBJECT_JITTER_M);
-            let (x, y) = (middle(column, columns) + jitter(), middle(row, rows) + OBJECT_CENTER_Y_M + jitter());
+            let mut jitter = || rng.random_range(-field.jitter_m..field.jitter_m);
+            let [center_x, center_y] = field.center_m;
+            let (x, y) = (middle(column, columns) + center_x + jitter(), middle(row, rows) + center_y + jitter());
             Vec3::new(x, y, body.shape.half_extents_m().z)
         }
     };

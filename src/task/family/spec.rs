@@ -34,6 +34,18 @@ pub(in crate::task) struct FamilySpec {
     pub(in crate::task) scene: fn(&[u16]) -> Scene,
     /// Random poses of the scene's bodies, without overlap.
     pub(in crate::task) poses: fn(&Scene, &mut ChaCha8Rng) -> Vec<Pose>,
+    /// How an arm has them before it.
+    pub(in crate::task) bench: Bench,
+}
+
+/// The layout before an arm.
+pub(in crate::task) struct Bench {
+    /// Half of the table's width and depth, in metres.
+    pub(in crate::task) table_half_m: [f32; 2],
+    /// Random poses of the scene's bodies, without overlap, all within the arm's reach.
+    pub(in crate::task) poses: fn(&Scene, &mut ChaCha8Rng) -> Vec<Pose>,
+    /// With table and arm in the picture.
+    pub(in crate::task) front_view: FrontView,
 }
 
 /// Slots that play the same part. What is told of one of them can be told of any other.

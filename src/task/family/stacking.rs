@@ -29,7 +29,7 @@ use crate::geometry::{Pose, Vec3, horizontal_distance, upright};
 use crate::program::Program;
 use crate::scene::{Body, Mobility, Scene, Shape, Slot, SlotIndex};
 use crate::seed::Seed;
-use crate::task::family::spec::{Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
+use crate::task::family::spec::{Bench, Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
 use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
 
 pub(super) static SPEC: FamilySpec = FamilySpec {
@@ -58,6 +58,14 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
     },
     scene,
     poses,
+    bench: BENCH,
+};
+
+/// The middle of the blocks is 0.62 m before the arm's base.
+const BENCH: Bench = Bench {
+    table_half_m: [0.8, 0.6],
+    poses,
+    front_view: FrontView { eye_m: [0.1, -1.62, 1.2], target_m: [-0.2, 0.0, 0.22] },
 };
 
 /// How many blocks there are, left out or not.

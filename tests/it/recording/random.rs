@@ -113,6 +113,7 @@ fn frames(rng: &mut ChaCha8Rng, scene: &Scene, n_frames: u32) -> Vec<Frame> {
                     opening_m: rng.random(),
                     held: rng.random_bool(0.5).then(|| BodyIndex(rng.random_range(0..poses.len()) as u16)),
                     bodies_in_world: poses.clone(),
+                    joints_rad: None,
                 },
                 slots: scene.slots.iter().map(|slot| *slot.bodies.choose(rng).unwrap()).collect(),
             }

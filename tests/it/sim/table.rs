@@ -72,6 +72,7 @@ impl Table {
             opening_m: 0.07,
             held: None,
             bodies_in_world: self.poses,
+            joints_rad: None,
         };
         (Scene { bodies: self.bodies, slots, table_half_m: [0.4, 0.4] }, initial)
     }

@@ -8,7 +8,7 @@ use crate::dataset::edit::target::{EditSummary, Target};
 use crate::dataset::files::info::{Features, Info, NtpInfo, Stats};
 use crate::dataset::files::layout;
 use crate::dataset::tables::annotated::vocabulary;
-use crate::dataset::tables::frames::feature::{FEATURES, declared};
+use crate::dataset::tables::frames::feature::{FEATURES, action_of, declared};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 use crate::program::KnownPrograms;
 
@@ -65,7 +65,7 @@ impl Target {
     fn declared_features(&self, slots: &[String]) -> Features {
         let is_ours = |name: &str| FEATURES.iter().any(|feature| feature.name == name);
         let others = self.info.features.0.iter().filter(|(name, _)| !is_ours(name)).cloned();
-        Features(declared(slots).0.into_iter().chain(others).collect())
+        Features(declared(slots, action_of(&self.info)).0.into_iter().chain(others).collect())
     }
 
     /// As many programs as the first dataset knows, or more where the episodes' families need them.

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use crate::dataset::DatasetError;
+use crate::dataset::config::ActionChoice;
 use crate::dataset::files::cursor::{Cursor, Rows};
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
 use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames::expected::{Before, FullFrameBatch, Labels, label_problem, step_problem};
-use crate::dataset::tables::frames::feature::ACTION_NAMES;
+use crate::dataset::tables::frames::expected::{
+    Before, FullFrameBatch, Labels, are_joints, label_problem, step_problem,
+};
+use crate::dataset::tables::frames::feature::action_width;
 use crate::dataset::tables::frames::paths::ProgramPaths;
 use crate::dataset::tables::frames::read::row_problem;
 use crate::dataset::tables::frames::run::Run;
@@ -20,6 +23,7 @@ use crate::trace::{Observation, ProgramCall};
 pub(crate) struct FrameCheck {
     width: usize,
     fps: u32,
+    action: ActionChoice,
     paths: ProgramPaths,
     path_texts: TextTable,
     range: StateRange,
@@ -46,12 +50,18 @@ impl StateRange {
     }
 }
 
+/// The last value of an action, which may be either there.
+fn closing(action: &[f32]) -> f32 {
+    action.last().copied().filter(|closed| [0.0, 1.0].contains(closed)).unwrap_or(f32::NAN)
+}
+
 impl FrameCheck {
-    pub(crate) fn new(n_slots: usize, fps: u32) -> Self {
+    pub(crate) fn new(n_slots: usize, fps: u32, action: ActionChoice) -> Self {
         let (width, fps) = (Observation::width(n_slots), fps.max(1));
         Self {
             width,
             fps,
+            action,
             paths: ProgramPaths::default(),
             path_texts: TextTable::default(),
             range: StateRange::default(),
@@ -75,7 +85,8 @@ impl FrameCheck {
         while first < row.n_frames {
             let rows = cursor.next_rows(row.data, usize::try_from(row.n_frames - first).unwrap_or(1))?;
             let (batch, range) = (rows.batch, rows.range.clone());
-            let run = Run { batch, range: range.clone(), row, first, width: self.width, fps: self.fps };
+            let run =
+                Run { batch, range: range.clone(), row, first, width: self.width, fps: self.fps, action: self.action };
             if !run.is_right(texts, before.as_ref(), running.as_mut()) {
                 self.find(&rows, row, first, (texts, before.take(), labels()), validation)?;
             }
@@ -103,7 +114,7 @@ impl FrameCheck {
                 return Err(rows.problem(at, problem));
             }
             let mut problems = self.row_problems(batch, at, row, frame, texts);
-            problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at)));
+            problems.extend(before.as_ref().and_then(|before| step_problem(before, batch, at, self.action)));
             problems.extend(labels.as_mut().and_then(|labels| label_problem(labels.at(frame), batch, at)));
             before = Some(Before::new(batch, at));
             for (code, problem) in problems {
@@ -142,10 +153,18 @@ impl FrameCheck {
         if !matches!(one_hot, [1.0, 0.0] | [0.0, 1.0]) {
             problems.push(("frames.state", format!("(open, closed) are {one_hot:?}")));
         }
-        if batch.action.row(at).len() != ACTION_NAMES.len() || batch.gripper.row(at).len() != 3 {
-            let lengths = (batch.action.row(at).len(), batch.gripper.row(at).len());
-            problems.push(("frames.action", format!("action and gripper position are {lengths:?} wide, not (4, 3)")));
-        } else if is_last && batch.action.row(at) != [0.0, 0.0, 0.0, one_hot[1]] {
+        let (action, width) = (batch.action.row(at), action_width(self.action));
+        let is_wrong = match self.action {
+            ActionChoice::Gripper => is_last && action != [0.0, 0.0, 0.0, one_hot[1]],
+            ActionChoice::Joints => !are_joints(action, if is_last { one_hot[1] } else { closing(action) }),
+        };
+        if action.len() != width || batch.gripper.row(at).len() != 3 {
+            let lengths = (action.len(), batch.gripper.row(at).len());
+            let problem = format!("action and gripper position are {lengths:?} wide, not ({width}, 3)");
+            problems.push(("frames.action", problem));
+        } else if is_wrong && !is_last {
+            problems.push(("frames.action", format!("the action is {action:?}")));
+        } else if is_wrong {
             problems.push(("frames.action", format!("the last action is {:?}", batch.action.row(at))));
         }
         problems

@@ -1,5 +1,6 @@
 //! What frames should be: by the row before them, and by the calls.
 
+use crate::dataset::config::ActionChoice;
 use crate::dataset::tables::frames;
 use crate::dataset::tables::frames::feature::ACTION_NAMES;
 use crate::dataset::tables::frames::paths::ProgramPaths;
@@ -31,6 +32,8 @@ batch! {
 /// What the row before said that the next one must fit.
 pub(crate) struct Before {
     action: [f32; ACTION_NAMES.len()],
+    /// The last value of the action.
+    closing: f32,
     gripper: [f32; 3],
     time_secs: f64,
     recording_frame: i64,
@@ -40,6 +43,7 @@ impl Before {
     pub(crate) fn new(batch: &FullFrameBatch, at: usize) -> Self {
         Self {
             action: first(batch.action.row(at)),
+            closing: batch.action.row(at).last().copied().unwrap_or(f32::NAN),
             gripper: first(batch.gripper.row(at)),
             time_secs: batch.time_secs[at],
             recording_frame: batch.recording_frame[at],
@@ -48,7 +52,12 @@ impl Before {
 }
 
 /// The action of the row before must lead to this one, later in time.
-pub(crate) fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -> Option<(&'static str, String)> {
+pub(crate) fn step_problem(
+    before: &Before,
+    batch: &FullFrameBatch,
+    at: usize,
+    action: ActionChoice,
+) -> Option<(&'static str, String)> {
     if batch.time_secs[at] <= before.time_secs || batch.recording_frame[at] <= before.recording_frame {
         let found = (batch.time_secs[at], batch.recording_frame[at]);
         return Some((
@@ -59,10 +68,21 @@ pub(crate) fn step_problem(before: &Before, batch: &FullFrameBatch, at: usize) -
     let [x, y, z] = first(batch.gripper.row(at));
     let [from_x, from_y, from_z] = before.gripper;
     let closed = batch.state.row(at).last().copied().unwrap_or(f32::NAN);
+    if action == ActionChoice::Joints {
+        let found = before.closing;
+        return (found != closed).then(|| {
+            ("frames.action", format!("the action of the row before ends with {found}, but leads to {closed}"))
+        });
+    }
     let expected = [x - from_x, y - from_y, z - from_z, closed];
     (before.action != expected).then(|| {
         ("frames.action", format!("the action of the row before is {:?}, but leads to {expected:?}", before.action))
     })
+}
+
+/// Whether an action tells angles, and whether the gripper holds something then.
+pub(crate) fn are_joints(action: &[f32], closed: f32) -> bool {
+    action.iter().all(|value| value.is_finite()) && action.last() == Some(&closed)
 }
 
 /// The first values of a vector; nothing but itself equals what is not there.

@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
+use crate::arm::JOINT_NAMES;
 use crate::dataset::DatasetError;
+use crate::dataset::config::ActionChoice;
 use crate::dataset::files::info::{Dtype, FeatureInfo, Features, Info};
 use crate::dataset::files::layout;
 use crate::dataset::tables::frames::{self, column};
@@ -15,6 +17,21 @@ use crate::trace::Observation;
 pub(crate) const ACTION_NAMES: [&str; 4] = ["gripper.dx_m", "gripper.dy_m", "gripper.dz_m", "gripper.closed"];
 /// Values of a position.
 pub(crate) const POSITION_NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// The column of an arm's joints. Datasets of a gripper without an arm do not have it.
+pub(crate) const JOINTS: Feature =
+    Feature { name: "ntp.joints_rad", dtype: Dtype::Float32, width: Width::Vector(&JOINT_NAMES) };
+/// Values of an `action` that says where joints are to be.
+pub(crate) const JOINT_ACTION_NAMES: [&str; 8] = [
+    "right_j0.rad",
+    "right_j1.rad",
+    "right_j2.rad",
+    "right_j3.rad",
+    "right_j4.rad",
+    "right_j5.rad",
+    "right_j6.rad",
+    "gripper.closed",
+];
 
 /// How many values a row has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,12 +54,13 @@ pub(crate) static FEATURES: LazyLock<Vec<Feature>> =
     LazyLock::new(|| frames::SCHEMA.specs().map(Feature::of).collect());
 
 /// The features as they are declared where slots have these names.
-pub(crate) fn declared(slots: &[String]) -> Features {
-    let declared = |feature: &Feature| {
-        let (dtype, shape) = (feature.dtype, vec![feature.width(slots.len())]);
-        (feature.name.to_owned(), FeatureInfo { dtype, shape, names: feature.value_names(slots), info: None })
-    };
-    Features(FEATURES.iter().map(declared).collect())
+pub(crate) fn declared(slots: &[String], action: ActionChoice) -> Features {
+    Features(FEATURES.iter().map(|feature| feature.of_action(action).declared(slots)).collect())
+}
+
+/// Every feature that this version knows, whether each dataset has it or not.
+pub(crate) fn known() -> impl Iterator<Item = &'static Feature> {
+    FEATURES.iter().chain([&JOINTS])
 }
 
 impl Feature {
@@ -62,6 +80,22 @@ impl Feature {
             Value::Picture | Value::Channels => Dtype::Other,
         };
         Self { name: column.name(), dtype, width }
+    }
+
+    /// The same where actions are told so.
+    pub(crate) fn of_action(&self, action: ActionChoice) -> Self {
+        match action {
+            ActionChoice::Joints if self.name == column::action::NAME => {
+                Self { width: Width::Vector(&JOINT_ACTION_NAMES), ..*self }
+            }
+            ActionChoice::Joints | ActionChoice::Gripper => *self,
+        }
+    }
+
+    /// As `meta/info.json` declares it where slots have these names.
+    pub(crate) fn declared(&self, slots: &[String]) -> (String, FeatureInfo) {
+        let (dtype, shape) = (self.dtype, vec![self.width(slots.len())]);
+        (self.name.to_owned(), FeatureInfo { dtype, shape, names: self.value_names(slots), info: None })
     }
 
     /// How many values a row has in scenes of `n_slots` slots.
@@ -94,6 +128,21 @@ impl Feature {
     /// Whether it has statistics.
     pub(crate) fn is_numeric(&self) -> bool {
         !matches!(self.dtype, Dtype::String | Dtype::Image | Dtype::Video | Dtype::Language | Dtype::Other)
+    }
+}
+
+/// What the actions of a dataset tell, from the declared width.
+pub(crate) fn action_of(info: &Info) -> ActionChoice {
+    let declared = info.features.0.iter().find(|(feature, _)| feature == column::action::NAME);
+    let width = declared.and_then(|(_, feature)| feature.shape.first().copied());
+    if width == Some(JOINT_ACTION_NAMES.len()) { ActionChoice::Joints } else { ActionChoice::Gripper }
+}
+
+/// How many values an action has.
+pub(crate) fn action_width(action: ActionChoice) -> usize {
+    match action {
+        ActionChoice::Gripper => ACTION_NAMES.len(),
+        ActionChoice::Joints => JOINT_ACTION_NAMES.len(),
     }
 }
 

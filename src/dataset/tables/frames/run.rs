@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use arrow::buffer::BooleanBuffer;
 
+use crate::dataset::config::ActionChoice;
 use crate::dataset::tables::episodes::read::EpisodeRow;
-use crate::dataset::tables::frames::expected::{Before, FullFrameBatch, Labels, step_problem};
-use crate::dataset::tables::frames::feature::{ACTION_NAMES, POSITION_NAMES};
+use crate::dataset::tables::frames::expected::{Before, FullFrameBatch, Labels, are_joints, step_problem};
+use crate::dataset::tables::frames::feature::{POSITION_NAMES, action_width};
 use crate::dataset::tables::texts::read::Texts;
 use crate::table::count_flags;
 
-const ACTION: usize = ACTION_NAMES.len();
 const POSITION: usize = POSITION_NAMES.len();
 
 /// An action; where the gripper was, and where it is then and whether it is closed.
@@ -26,6 +26,8 @@ pub(crate) struct Run<'r> {
     /// Of `observation.state`.
     pub(crate) width: usize,
     pub(crate) fps: u32,
+    /// What `action` tells.
+    pub(crate) action: ActionChoice,
 }
 
 impl Run<'_> {
@@ -63,7 +65,7 @@ impl Run<'_> {
 
     fn has_vectors(&self) -> bool {
         self.batch.state.are_of_width(&self.range, self.width)
-            && self.batch.action.are_of_width(&self.range, ACTION)
+            && self.batch.action.are_of_width(&self.range, action_width(self.action))
             && self.batch.gripper.are_of_width(&self.range, POSITION)
             && self.states().iter().fold(true, |all, value| all & value.is_finite())
     }
@@ -119,14 +121,25 @@ impl Run<'_> {
             let moved = (action[0] == to[0] - from[0]) & (action[1] == to[1] - from[1]);
             moved & (action[2] == to[2] - from[2]) & (action[3] == closed)
         };
-        let steps = actions.chunks_exact(ACTION).zip(moves.zip(closed.clone().skip(1)));
-        let ends_still = |last: usize| {
-            let expected = [0.0, 0.0, 0.0, self.batch.state.row(last)[self.width - 1]];
-            self.batch.action.row(last) == expected
+        let actions = actions.chunks_exact(action_width(self.action));
+        let are_led = match self.action {
+            ActionChoice::Gripper => {
+                actions.zip(moves.zip(closed.clone().skip(1))).fold(true, |all, step| all & leads(step))
+            }
+            ActionChoice::Joints => {
+                actions.zip(closed.skip(1)).fold(true, |all, (action, closed)| all & are_joints(action, closed))
+            }
         };
-        steps.fold(true, |all, step| all & leads(step))
+        let ends_still = |last: usize| {
+            let (action, closed) = (self.batch.action.row(last), self.batch.state.row(last)[self.width - 1]);
+            match self.action {
+                ActionChoice::Gripper => action == [0.0, 0.0, 0.0, closed],
+                ActionChoice::Joints => are_joints(action, closed),
+            }
+        };
+        are_led
             && self.last().is_none_or(ends_still)
-            && before.is_none_or(|before| step_problem(before, self.batch, self.range.start).is_none())
+            && before.is_none_or(|before| step_problem(before, self.batch, self.range.start, self.action).is_none())
     }
 
     fn has_labels(&self, labels: &mut Labels<'_>) -> bool {

@@ -1,12 +1,15 @@
 //! Episodes to rows of `data/`.
 
-use crate::dataset::tables::frames::feature::{ACTION_NAMES, FEATURES, POSITION_NAMES, Width};
+use crate::arm::N_JOINTS;
+use crate::dataset::config::ActionChoice;
+use crate::dataset::files::info::FeatureInfo;
+use crate::dataset::tables::frames::feature::{JOINTS, POSITION_NAMES, Width, action_width, known};
 use crate::dataset::tables::frames::paths::ProgramPaths;
 use crate::dataset::tables::frames::{Rows, SCHEMA};
 use crate::dataset::tables::texts::subtask::subtask_text;
 use crate::dataset::tables::view::EpisodeView;
 use crate::table::{TableRows as _, TextTable, Values, WriteOptions};
-use crate::trace::{Frame, Observation};
+use crate::trace::{Episode, Frame, Observation};
 
 const POSITION_WIDTH: usize = POSITION_NAMES.len();
 
@@ -22,17 +25,46 @@ pub(crate) struct EpisodeIds {
 /// Rows that are not yet written.
 pub(crate) struct FrameRows {
     rows: Rows,
+    action: ActionChoice,
+    /// Of an arm's joints; `None` without an arm.
+    joints_rad: Option<Vec<f32>>,
     paths: ProgramPaths,
     subtasks: TextTable,
 }
 
 impl FrameRows {
-    pub(crate) fn new(n_slots: usize) -> Self {
+    /// None yet, of scenes with so many slots, with or without an arm.
+    pub(crate) fn new(n_slots: usize, action: ActionChoice, has_joints: bool) -> Self {
         let mut rows = Rows::default();
         rows.state.width = Observation::width(n_slots);
-        rows.action.width = ACTION_NAMES.len();
+        rows.action.width = action_width(action);
         rows.gripper.width = POSITION_WIDTH;
-        Self { rows, paths: ProgramPaths::default(), subtasks: TextTable::default() }
+        let (paths, subtasks) = (ProgramPaths::default(), TextTable::default());
+        Self { rows, action, joints_rad: has_joints.then(Vec::new), paths, subtasks }
+    }
+
+    /// Whether an episode can be added: its robot has an arm if those before had one, and none if not.
+    pub(crate) fn fits(&self, episode: &Episode) -> bool {
+        has_joints(episode) == self.joints_rad.is_some()
+    }
+
+    /// Whether its robots have an arm.
+    pub(crate) fn has_joints(&self) -> bool {
+        self.joints_rad.is_some()
+    }
+
+    /// Further columns of `data/`, as lines of the schema's text.
+    pub(crate) fn further(&self) -> Vec<String> {
+        let column = format!(
+            "  required group {} (LIST) {{ repeated group list {{ required float element; }} }}\n",
+            JOINTS.name
+        );
+        self.joints_rad.iter().map(|_| column.clone()).collect()
+    }
+
+    /// As `meta/info.json` declares them.
+    pub(crate) fn declared_further(&self, slots: &[String]) -> Vec<(String, FeatureInfo)> {
+        self.joints_rad.iter().map(|_| JOINTS.declared(slots)).collect()
     }
 
     pub(crate) fn n_rows(&self) -> usize {
@@ -45,8 +77,8 @@ impl FrameRows {
     }
 
     /// How the table is written where scenes have so many slots.
-    pub(crate) fn options(n_slots: usize) -> WriteOptions {
-        let vectors = FEATURES.iter().filter(|feature| feature.width != Width::Scalar);
+    pub(crate) fn options(n_slots: usize, action: ActionChoice) -> WriteOptions {
+        let vectors = known().filter(|feature| feature.width != Width::Scalar).map(|feature| feature.of_action(action));
         let list_lengths = vectors.map(|feature| (feature.name, feature.width(n_slots) as i32)).collect();
         WriteOptions { list_lengths, ..SCHEMA.options() }
     }
@@ -68,6 +100,9 @@ impl FrameRows {
             self.rows.recording_frame.push(i64::from(recorded));
             let gripper = frame.state.gripper_in_world.translation.vector;
             self.rows.gripper.values.extend_from_slice(&[gripper.x, gripper.y, gripper.z]);
+            if let (Some(joints_rad), Some(now)) = (&mut self.joints_rad, &frame.state.joints_rad) {
+                joints_rad.extend_from_slice(now);
+            }
         }
         let n_after = self.rows.index.len();
         self.rows.episode_index.resize(n_after, ids.episode_index);
@@ -81,6 +116,11 @@ impl FrameRows {
         let closed_at = |row: usize| (row + 1) * self.rows.state.width - 1;
         for row in first..first + n_rows {
             let next = (row + 1).min(first + n_rows - 1);
+            if let (ActionChoice::Joints, Some(joints_rad)) = (self.action, &self.joints_rad) {
+                self.rows.action.values.extend_from_slice(&joints_rad[N_JOINTS * next..N_JOINTS * (next + 1)]);
+                self.rows.action.values.push(self.rows.state.values[closed_at(next)]);
+                continue;
+            }
             let (here, there) = (POSITION_WIDTH * row, POSITION_WIDTH * next);
             let [from, to] = [here, there].map(|at| &self.rows.gripper.values[at..at + POSITION_WIDTH]);
             let closed = self.rows.state.values[closed_at(next)];
@@ -114,13 +154,20 @@ impl FrameRows {
 
     /// The columns of all rows.
     pub(crate) fn columns(&self) -> Vec<(&'static str, Values<'_>)> {
-        self.rows.columns()
+        let joints = self.joints_rad.as_ref().map(|values| (JOINTS.name, Values::Float32Vector(values, N_JOINTS)));
+        self.rows.columns().into_iter().chain(joints).collect()
     }
 
     /// Forgets all rows, but not the texts.
     pub(crate) fn clear(&mut self) {
         self.rows.clear();
+        self.joints_rad.iter_mut().for_each(Vec::clear);
     }
+}
+
+/// Whether an episode's robot has an arm.
+pub(crate) fn has_joints(episode: &Episode) -> bool {
+    episode.frames.first().is_some_and(|frame| frame.state.joints_rad.is_some())
 }
 
 /// As [`Observation::to_flat`], without an allocation per frame.

@@ -1,0 +1,71 @@
+//! The arm above the gripper: its collision capsules, painted as the maker paints them.
+
+use crate::arm::{BASE_IN_WORLD_M, Capsule, capsules};
+use crate::geometry::{Pose, Vec3};
+use crate::render::look::linear;
+use crate::render::mesh::{Mesh, Paint, Surface};
+
+/// A part of a link.
+#[derive(Debug)]
+pub(in crate::render) struct ArmPart {
+    /// 0 for the base.
+    pub(in crate::render) link: usize,
+    pub(in crate::render) in_link: Pose,
+    pub(in crate::render) mesh: Mesh,
+}
+
+const N_SIDES: usize = 24;
+/// Rings of a rounded end.
+const N_RINGS: usize = 6;
+/// Radius of the pedestal that the base stands on.
+const PEDESTAL_M: f32 = 0.11;
+/// The last link's parts: the body of the gripper.
+const LAST_LINK: usize = 7;
+
+/// All parts.
+pub(super) fn parts() -> Vec<ArmPart> {
+    let pedestal = ArmPart { link: 0, in_link: Pose::identity(), mesh: pedestal() };
+    capsules().map(|capsule| part(&capsule)).chain([pedestal]).collect()
+}
+
+fn part(capsule: &Capsule) -> ArmPart {
+    let (length_m, in_link) = capsule.standing();
+    ArmPart { link: capsule.link, in_link, mesh: rounded(capsule.radius_m as f32, length_m, paint(capsule)) }
+}
+
+/// Long parts are red, joints and gripper dark.
+fn paint(capsule: &Capsule) -> Paint {
+    let length_m =
+        (Vec3::from(capsule.to_m.map(|at| at as f32)) - Vec3::from(capsule.from_m.map(|at| at as f32))).norm();
+    let is_red = capsule.link > 0 && capsule.link < LAST_LINK && length_m > 0.13;
+    let color = if is_red { linear([150, 30, 34]) } else { linear([58, 60, 66]) };
+    Paint { color, gloss: 0.35 }
+}
+
+/// A cylinder of a length with rounded ends below and above.
+fn rounded(radius_m: f32, length_m: f32, paint: Paint) -> Mesh {
+    let mut mesh = Mesh::default();
+    let quarter = |ring: usize| {
+        let angle = std::f32::consts::FRAC_PI_2 * ring as f32 / N_RINGS as f32;
+        [radius_m * angle.cos(), radius_m * angle.sin()]
+    };
+    let below = (0..=N_RINGS).rev().map(|ring| {
+        let [out, down] = quarter(ring);
+        [out, -down]
+    });
+    let above = (0..=N_RINGS).map(|ring| {
+        let [out, up] = quarter(ring);
+        [out, length_m + up]
+    });
+    let profile: Vec<[f32; 2]> = below.chain(above).collect();
+    mesh.lathe(&profile, N_SIDES, paint, |radial, axial| Surface::Cone { radial, axial });
+    mesh
+}
+
+/// From the table up to the base.
+fn pedestal() -> Mesh {
+    let mut mesh = Mesh::default();
+    let paint = Paint { color: linear([70, 72, 78]), gloss: 0.1 };
+    mesh.cylinder(PEDESTAL_M, [-BASE_IN_WORLD_M[2] as f32, 0.0], N_SIDES, paint);
+    mesh
+}
