@@ -57,23 +57,23 @@ impl Obstacles {
     /// solids.
     pub fn are_clear(&self, posture: &Posture, load: &Load) -> bool {
         let links = links(posture);
-        self.load_is_clear(&tool(&links[N_JOINTS - 1]), load) && self.links_are_clear(&links)
+        self.load_is_clear(&tool(&links[N_JOINTS - 1]), load) && self.links_are_clear(&links, self.margin_m)
     }
 
-    /// The same for the arm alone, without gripper.
-    pub fn arm_is_clear(&self, posture: &Posture) -> bool {
-        self.links_are_clear(&links(posture))
+    /// The same for the arm alone, without gripper, with another margin: beside what it grips the arm passes closely.
+    pub fn arm_is_clear(&self, posture: &Posture, margin_m: f64) -> bool {
+        self.links_are_clear(&links(posture), margin_m)
     }
 
-    fn links_are_clear(&self, links: &[Frame; N_JOINTS]) -> bool {
+    fn links_are_clear(&self, links: &[Frame; N_JOINTS], margin_m: f64) -> bool {
         let capsules = of_links(links);
-        self.capsules_are_clear(&capsules) && self_clearance_m(&capsules, self.margin_m) >= self.margin_m
+        self.capsules_are_clear(&capsules, margin_m) && self_clearance_m(&capsules, margin_m) >= margin_m
     }
 
-    fn capsules_are_clear(&self, capsules: &[PlacedCapsule; N_PARTS]) -> bool {
+    fn capsules_are_clear(&self, capsules: &[PlacedCapsule; N_PARTS], margin_m: f64) -> bool {
         let moving = capsules.iter().filter(|capsule| (FIRST_MOVING_LINK..WRIST).contains(&capsule.link));
         moving.into_iter().all(|capsule| {
-            let room = capsule.radius_m + self.margin_m;
+            let room = capsule.radius_m + margin_m;
             let lowest_z = capsule.from.z.min(capsule.to.z);
             lowest_z - room >= self.table_z && self.solids.iter().all(|solid| is_clear(capsule, solid, room))
         })

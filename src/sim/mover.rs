@@ -23,6 +23,8 @@ use crate::trace::Cause;
 
 /// How near the arm comes to itself and to what stands there, in metres.
 pub(super) const MARGIN_M: f64 = 0.01;
+/// The same beside what it grips, where a neighbour may stand as near as the gripper's palm lets it.
+const NEAREST_M: f64 = 0.002;
 /// Postures of a straight way that are looked at, beside the first.
 const N_SAMPLES: u32 = 16;
 /// Every so many of them are checked for what stands there.
@@ -158,7 +160,7 @@ impl Stance {
         let postures: Option<Vec<Posture>> = stances.map(|stance| Some(stance?.posture)).collect();
         let postures = postures.ok_or(Cause::NoPath)?;
         let mut checked = postures.iter().skip(CHECK_EVERY).step_by(CHECK_EVERY);
-        if !checked.all(|posture| around.obstacles.arm_is_clear(posture)) {
+        if !checked.all(|posture| around.obstacles.arm_is_clear(posture, NEAREST_M)) {
             return Err(Cause::NoPath);
         }
         motion.n_steps = motion.n_steps.max(steps(duration_through_secs(&postures), config));
