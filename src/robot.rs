@@ -27,7 +27,7 @@ pub enum RobotKind {
     /// A gripper that flies freely.
     #[default]
     Gripper,
-    /// Rethink Robotics' Sawyer with the same gripper: see [`arm`](crate::arm).
+    /// Rethink Robotics' Sawyer with the same gripper.
     Sawyer,
 }
 

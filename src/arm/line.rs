@@ -20,7 +20,7 @@ pub fn min_jerk(share: f64) -> f64 {
 }
 
 /// A little more time than the differences between a few postures ask for: those between are not looked at.
-const SPARE: f64 = 1.01;
+const SPARE: f64 = 1.02;
 
 /// The time in which the arm passes through postures at even shares of the duration, at rest at both ends, so that no
 /// joint exceeds its greatest speed or acceleration, in seconds.

@@ -51,6 +51,10 @@ fn the_expert_brings_tasks_of_every_family_to_their_end_with_the_arm() {
     }
 }
 
+/// How far a second difference of recorded angles may be off, in radians: they are of four bytes, so each below 4 is off
+/// by at most 2⁻²³, and the middle one counts twice.
+const ROUNDED_RAD: f64 = 4.0 / 8_388_608.0;
+
 /// The greatest of a joint's angle, speed and acceleration over what it allows, over all frames at every step.
 fn strain(frames: &[Frame]) -> [f64; 3] {
     let mut strain = [0.0_f64; 3];
@@ -58,13 +62,11 @@ fn strain(frames: &[Frame]) -> [f64; 3] {
     for window in frames.windows(3) {
         let [before, now, after] = [0, 1, 2].map(|at| posture(&window[at]).0);
         strain[0] = strain[0].max(f64::from(u8::from(!Posture(now).is_within_limits())));
-        // A frame that is due at the end of an action is the boundary: times are steps throughout.
-        assert_eq!(window[2].time_nanos - window[1].time_nanos, window[2].time_nanos - window[1].time_nanos);
         for joint in 0..7 {
             let (speed, acceleration) = arm::limits(joint);
             strain[1] = strain[1].max((after[joint] - now[joint]).abs() / step_secs / speed);
             let bent = (after[joint] - 2.0 * now[joint] + before[joint]).abs();
-            strain[2] = strain[2].max(bent / step_secs / step_secs / acceleration);
+            strain[2] = strain[2].max((bent - ROUNDED_RAD) / step_secs / step_secs / acceleration);
         }
     }
     strain
@@ -79,8 +81,7 @@ fn no_frame_of_an_episode_is_beyond_the_arms_limits() {
             let episode = demonstration(task, number as u64, &config);
             let [beyond, fastest, hardest] = strain(&episode.frames);
             assert!(beyond == 0.0 && fastest <= 1.001, "{}: {beyond} {fastest}", task.id);
-            // Recorded angles are of four bytes: their rounding, twice differenced, is a few thousandths.
-            assert!(hardest <= 1.02, "{}: {hardest}", task.id);
+            assert!(hardest <= 1.001, "{}: {hardest}", task.id);
             for frame in episode.frames.iter().step_by(8) {
                 assert!(self_clearance(&posture(frame)) > 0.0);
                 let tool = forward(&posture(frame)).position + arm::Vector::from(arm::BASE_IN_WORLD_M);
