@@ -76,6 +76,8 @@ pub enum Command {
     Status(StatusArgs),
     /// Turn recordings of robots, MCAP of any writer, into a LeRobotDataset.
     Ingest(IngestArgs),
+    /// Label demonstrations that have no labels: models take them apart into program calls.
+    Annotate(AnnotateArgs),
     /// Say what a file or folder is, and how much is in it.
     Inspect(PathArgs),
     /// Check a file or folder: its checksums, and all that a reader relies on.
@@ -573,6 +575,53 @@ pub struct RepairArgs {
     pub json: bool,
 }
 
+/// `ntp annotate`.
+#[derive(Debug, Args)]
+pub struct AnnotateArgs {
+    /// A `LeRobotDataset` v3.0 whose `observation.state` holds positions of objects relative to the gripper.
+    pub dataset: PathBuf,
+    /// A trained model that knows the dataset's slots. Several: each episode has the labels of the surest, and where
+    /// they disagree it is doubtful.
+    #[arg(long, value_name = "MODEL", required = true)]
+    pub model: Vec<PathBuf>,
+    /// The new folder.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    /// A dataset with true labels of the same episodes: says how well the new ones agree with them.
+    #[arg(long, value_name = "TRUTH")]
+    pub against: Option<PathBuf>,
+    /// Episodes with a call of less confidence than this are listed for a person to look at, 0 to 1.
+    #[arg(long, value_name = "CONFIDENCE", default_value_t = 0.5, value_parser = share)]
+    pub doubt_below: f32,
+    /// Which rows are the ends of primitives. rows: all. found: those that the gripper's motion shows. auto: as the
+    /// dataset says.
+    #[arg(long, value_name = "WHICH", value_enum, default_value = "auto")]
+    pub key_frames: KeyFrameChoice,
+    /// How parts of a demonstration are chosen from scores of its frames.
+    #[arg(long, value_name = "DECODER", value_parser = ["argmax", "mss", "am"], default_value = "mss")]
+    pub decoder: String,
+    /// The day, for the dataset's card, as YYYY-MM-DD.
+    #[arg(long, value_name = "DATE")]
+    pub date: Option<Date>,
+    /// How many threads [default: one a core]. Results are the same bytes with any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Which rows of a dataset are key frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum KeyFrameChoice {
+    /// As the dataset says.
+    Auto,
+    /// All.
+    Rows,
+    /// Those that are found.
+    Found,
+}
+
 /// `ntp dataset`.
 #[derive(Debug, Subcommand)]
 pub enum DatasetCommand {
@@ -711,4 +760,10 @@ pub struct DiffArgs {
 fn speed(text: &str) -> Result<f32, String> {
     let speed: f32 = text.parse().map_err(|_error| format!("{text:?} is no number"))?;
     if speed > 0.0 && speed <= 1000.0 { Ok(speed) } else { Err("allowed: above 0, up to 1000".to_owned()) }
+}
+
+/// A share, 0 to 1.
+fn share(text: &str) -> Result<f32, String> {
+    let share: f32 = text.parse().map_err(|_error| format!("{text:?} is no number"))?;
+    if (0.0..=1.0).contains(&share) { Ok(share) } else { Err("allowed: 0 to 1".to_owned()) }
 }

@@ -2,6 +2,7 @@
 //! stderr.
 
 mod act;
+mod annotate;
 mod cluster;
 mod completions;
 mod dataset;
@@ -95,6 +96,7 @@ fn stops_in_order(command: &Command) -> bool {
         | Command::Submit(_)
         | Command::Status(_)
         | Command::Ingest(_)
+        | Command::Annotate(_)
         | Command::Inspect(_)
         | Command::Validate(_)
         | Command::Replay(_)
@@ -144,6 +146,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Submit(args) => cluster::submit(args),
         Command::Status(args) => cluster::status(args),
         Command::Ingest(args) => ingest::run(args),
+        Command::Annotate(args) => annotate::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Validate(args) => validate::run(args),
         Command::Replay(args) => replay::run(args),

@@ -27,6 +27,7 @@ mod decode;
 mod episode;
 mod error;
 mod map;
+mod observe;
 mod path;
 mod picture;
 mod probe;
@@ -55,9 +56,16 @@ pub use propose::propose;
 pub fn ingest(files: &[PathBuf], map: &Map, to: &Path) -> Result<IngestSummary, IngestError> {
     let features = probe::features(files, map)?;
     let staged = StagedDir::begin(to)?;
-    let declared: Vec<_> = features.iter().map(probe::Feature::declared).collect();
+    let observer = probe::observer(&files[0], map, &features)?;
+    let declared: Vec<_> = match &observer {
+        // The numbers that observations are made of are the first feature.
+        Some(observer) => {
+            observer.declared().into_iter().chain(features[1..].iter().map(probe::Feature::declared)).collect()
+        }
+        None => features.iter().map(probe::Feature::declared).collect(),
+    };
     let writer = PlainWriter::create(staged.partial_path(), &declared, map.fps, &map.robot_type, map.file_megabytes);
-    let mut rows = Rows::new(map, &features, writer);
+    let mut rows = Rows::new(map, &features, observer, writer);
     for file in files {
         rows.file(file)?;
     }

@@ -17,6 +17,7 @@ pub mod scene;
 pub mod seed;
 pub mod table;
 
+pub mod annotate;
 pub mod cluster;
 pub mod dataset;
 pub mod deploy;

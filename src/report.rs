@@ -42,13 +42,15 @@ pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
 pub use rollouts::RolloutsInput;
 pub use summary::{
-    Aggregate, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult, TrainingEnd,
+    Aggregate, AnnotationResult, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult,
+    TrainingEnd,
 };
 
 use std::path::{Path, PathBuf};
 
 use polars::error::PolarsError;
 
+use crate::annotate::Measured;
 use crate::artifact::{self, IoError};
 
 /// What a report is made of. Any part may be empty: a report of a run that has only trained is a report.
@@ -62,6 +64,8 @@ pub struct ReportInputs {
     pub metrics: Vec<MetricsInput>,
     /// detections.parquet files, in any order.
     pub detections: Vec<DetectionsInput>,
+    /// Annotated datasets, in the order they are to be shown.
+    pub annotations: Vec<AnnotationsInput>,
     /// Episodes in pictures, in the order they are to be shown.
     pub filmstrips: Vec<Filmstrip>,
     /// What else there is to say of the run, in the order it is to be told.
@@ -72,6 +76,17 @@ pub struct ReportInputs {
     pub commits: Vec<String>,
     /// What to set beside the results; [`paper_values`] as a rule.
     pub paper: Vec<PaperValue>,
+}
+
+/// An annotated dataset that was measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AnnotationsInput {
+    /// Of which experiment.
+    pub experiment: String,
+    /// What it is called.
+    pub name: String,
+    /// Its `ntp/annotation.json`.
+    pub path: PathBuf,
 }
 
 /// A report that cannot be made.
@@ -123,6 +138,12 @@ pub enum ReportError {
     /// A query over checked tables failed.
     #[error("cannot sum up the tables: {0}")]
     Query(#[source] PolarsError),
+    /// Labels were made, but not held against true ones.
+    #[error("measured: it is missing; annotate with --against: {}", path.display())]
+    NotMeasured {
+        /// Which file.
+        path: PathBuf,
+    },
     /// The page could not be filled in.
     #[error("cannot fill in the page: {0}")]
     Page(#[from] minijinja::Error),
@@ -164,6 +185,7 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         grids: figures::grids(&aggregates),
         aggregates,
         detections: detections::read(&inputs.detections, &rollouts.results)?,
+        annotations: inputs.annotations.iter().map(annotation).collect::<Result<_, _>>()?,
         results: rollouts.results,
         divergences: rollouts.divergences,
         errors: rollouts.errors,
@@ -185,6 +207,18 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
     Ok(report)
 }
 
+/// Reads what was measured of an annotated dataset.
+fn annotation(input: &AnnotationsInput) -> Result<AnnotationResult, ReportError> {
+    #[derive(serde::Deserialize)]
+    struct Told {
+        measured: Option<Measured>,
+    }
+    let AnnotationsInput { experiment, name, path } = input.clone();
+    let told: Told = artifact::read_json(&path)?;
+    let measured = told.measured.ok_or(ReportError::NotMeasured { path })?;
+    Ok(AnnotationResult { experiment, name, measured })
+}
+
 /// The JSON schema of report.json, as in schemas/report.schema.json.
 pub fn json_schema() -> serde_json::Value {
     schemars::schema_for!(Report).to_value()
@@ -196,7 +230,8 @@ fn input_files(inputs: &ReportInputs, out: &Path) -> Result<Vec<InputFile>, IoEr
     let run_dir = out.parent().unwrap_or(out);
     let paths = (inputs.rollouts.iter().map(|rollouts| &rollouts.path))
         .chain(inputs.metrics.iter().map(|metrics| &metrics.path))
-        .chain(inputs.detections.iter().map(|detections| &detections.path));
+        .chain(inputs.detections.iter().map(|detections| &detections.path))
+        .chain(inputs.annotations.iter().map(|annotations| &annotations.path));
     let file = |path: &PathBuf| {
         let shown = path.strip_prefix(run_dir).unwrap_or(path);
         Ok(InputFile { path: shown.display().to_string(), sha256: artifact::sha256_file(path)? })

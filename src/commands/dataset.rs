@@ -24,7 +24,7 @@ pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
 }
 
 /// Refuses a folder within a dataset that is read: it would become a part of it.
-fn refuse_within(source: &Path, to: &Path) -> Result<(), UsageError> {
+pub(super) fn refuse_within(source: &Path, to: &Path) -> Result<(), UsageError> {
     let there = std::path::absolute(to).ok();
     let there = there.and_then(|to| to.ancestors().find_map(|path| path.canonicalize().ok()));
     let (Ok(source), Some(there)) = (source.canonicalize(), there) else { return Ok(()) };

@@ -16,6 +16,7 @@
 //! Memory holds some thousand rows of each table and one video file, whatever the number of episodes; and an entry for each recording and
 //! distinct task. The same sources and settings give the same bytes. Sources are never written to.
 
+mod annotation;
 mod condition;
 mod cursor;
 mod diff;
@@ -97,6 +98,7 @@ fn write(
     let mut target = Target::create(folder, first)?;
     let mut descriptions = Vec::new();
     let mut seen = Seen::default();
+    let roots: Vec<PathBuf> = sources.iter().map(|source| source.root().to_owned()).collect();
     let failed_left_out = sources.iter().map(|source| source.ntp.failed_left_out).sum();
     let path = first.root().to_owned();
     for mut source in sources {
@@ -116,7 +118,8 @@ fn write(
     if target.n_episodes() == 0 {
         return Err(EditError::refused("edit.empty", &path, "no episode is left: none is as it is asked for"));
     }
-    let summary = target.finish(failed_left_out)?;
+    let mut summary = target.finish(failed_left_out)?;
+    annotation::carry(&roots, folder, &mut summary.files)?;
     commit(stage, &descriptions, settings, folder, &summary)?;
     Ok(summary)
 }

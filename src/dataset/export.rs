@@ -13,8 +13,8 @@
 
 mod behavior;
 mod events;
-mod labels;
-mod language;
+pub(crate) mod labels;
+pub(crate) mod language;
 mod plain;
 mod sarm;
 

@@ -35,6 +35,7 @@ use crate::dataset::tables::annotated::{ANNOTATED_BY, vocabulary};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 use frames::write_frames;
+pub(in crate::dataset) use rows::task_id;
 use rows::{AnnotatedRows, write_meta};
 use texts::{read_subtasks, read_tasks};
 

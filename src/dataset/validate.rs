@@ -4,6 +4,7 @@
 //! missing) ends the check of that table; the others go on.
 
 mod annotated;
+mod by_model;
 mod meta;
 mod pictures;
 
@@ -35,9 +36,10 @@ pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
     // One that cannot be read is found below.
     let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
-    if info.is_ok_and(|info| info.annotated_by.is_some()) {
+    if let Some(info) = info.ok().filter(|info| info.annotated_by.is_some()) {
         let texts = read_all_texts(root, &mut validation);
-        if let Err(error) = annotated::check(root, &texts, &mut validation) {
+        let check = if info.has_our_programs() { by_model::check } else { annotated::check };
+        if let Err(error) = check(root, &texts, &mut validation) {
             validation.failed("episodes.row", &error);
         }
         return validation;

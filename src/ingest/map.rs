@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::error::IngestError;
+use super::observe::{GRIPPER, ObservationsMap};
 use super::path::FieldPath;
 use crate::artifact::read;
 use crate::dataset::plain::ROW_FEATURES;
@@ -33,8 +34,11 @@ pub struct Map {
     /// Where episodes begin and end.
     #[serde(default)]
     pub(super) episodes: Episodes,
-    /// The features, in the order of the dataset.
-    #[serde(rename = "feature")]
+    /// Poses that become our observations.
+    #[serde(default)]
+    pub(super) observations: Option<ObservationsMap>,
+    /// The features, in the order of the dataset; first the numbers that observations are made of, if there are any.
+    #[serde(rename = "feature", default)]
     pub(super) features: Vec<FeatureMap>,
 }
 
@@ -190,7 +194,14 @@ impl Map {
         let wrong = |problem: String| IngestError::Map { path: path.to_owned(), problem };
         let bytes = read(path)?;
         let text = std::str::from_utf8(&bytes).map_err(|error| wrong(error.to_string()))?;
-        let map: Self = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        let mut map: Self = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        if let Some(observations) = &map.observations {
+            let taken = |feature: &FeatureMap| feature.name == GRIPPER;
+            if map.features.iter().any(taken) {
+                return Err(wrong(format!("feature {GRIPPER:?} is what observations give")));
+            }
+            map.features.insert(0, observations.feature().map_err(wrong)?);
+        }
         map.check().map_err(wrong)?;
         Ok(map)
     }
@@ -210,7 +221,7 @@ impl Map {
             return Err(format!("episodes.secs is {secs}; it is above 0"));
         }
         if features.is_empty() {
-            return Err("no [[feature]]".to_owned());
+            return Err("no [[feature]] and no [observations]".to_owned());
         }
         let mut names = BTreeSet::new();
         for feature in features {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::decode::Decoder;
 use super::error::IngestError;
 use super::map::{FeatureMap, Map, NumberType, Store};
+use super::observe::Observer;
 use super::picture::packet_size;
 use super::sample::{Content, ContentKind, Sampler};
 use crate::dataset::plain::{Dtype, PlainFeature, PlainKind};
@@ -77,6 +78,14 @@ pub(super) fn features<'m>(files: &[PathBuf], map: &'m Map) -> Result<Vec<Featur
         resolve(path, feature, of_sources, &all_topics)
     };
     map.features.iter().map(feature).collect()
+}
+
+/// What makes observations of the first feature's numbers, if the map asks for them.
+pub(super) fn observer(path: &Path, map: &Map, features: &[Feature<'_>]) -> Result<Option<Observer>, IngestError> {
+    let Some(observations) = &map.observations else { return Ok(None) };
+    let wrong = |problem: String| IngestError::Map { path: path.to_owned(), problem };
+    Observer::check(features.first().map_or(&[], |first| &first.widths)).map_err(wrong)?;
+    Observer::new(observations).map(Some).map_err(wrong)
 }
 
 /// The decoder of a channel, made when it is first needed.

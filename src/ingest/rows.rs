@@ -9,6 +9,7 @@ use super::decode::Decoder;
 use super::episode::{Bound, Bounds};
 use super::error::IngestError;
 use super::map::{Clock, Map, Task, nanos};
+use super::observe::Observer;
 use super::probe::{self, Feature};
 use super::sample::{Content, ContentKind, Sampler};
 use super::track::{Taken, Track};
@@ -21,18 +22,24 @@ use crate::video::{H264Encoder, VideoError};
 pub(super) struct Rows<'m> {
     map: &'m Map,
     features: &'m [Feature<'m>],
+    observer: Option<Observer>,
     writer: PlainWriter,
     summary: IngestSummary,
 }
 
 impl<'m> Rows<'m> {
-    pub(super) fn new(map: &'m Map, features: &'m [Feature<'m>], writer: PlainWriter) -> Self {
-        Self { map, features, writer, summary: IngestSummary::default() }
+    pub(super) fn new(
+        map: &'m Map,
+        features: &'m [Feature<'m>],
+        observer: Option<Observer>,
+        writer: PlainWriter,
+    ) -> Self {
+        Self { map, features, observer, writer, summary: IngestSummary::default() }
     }
 
     /// Adds the episodes of a file.
     pub(super) fn file(&mut self, path: &Path) -> Result<(), IngestError> {
-        let mut reading = Reading::new(path, self.map, self.features, &mut self.writer, &mut self.summary);
+        let mut reading = Reading::new(path, self);
         read_messages(path, |message| {
             reading.message(message)?;
             Ok::<_, IngestError>(ControlFlow::Continue(()))
@@ -79,6 +86,7 @@ struct Reading<'r, 'm> {
     path: &'r Path,
     map: &'m Map,
     features: &'m [Feature<'m>],
+    observer: Option<&'r mut Observer>,
     writer: &'r mut PlainWriter,
     summary: &'r mut IngestSummary,
     uses: BTreeMap<&'m str, Vec<Use>>,
@@ -96,13 +104,9 @@ struct Reading<'r, 'm> {
 }
 
 impl<'r, 'm> Reading<'r, 'm> {
-    fn new(
-        path: &'r Path,
-        map: &'m Map,
-        features: &'m [Feature<'m>],
-        writer: &'r mut PlainWriter,
-        summary: &'r mut IngestSummary,
-    ) -> Self {
+    fn new(path: &'r Path, rows: &'r mut Rows<'m>) -> Self {
+        let Rows { map, features, observer, writer, summary } = rows;
+        let (map, features) = (*map, *features);
         let bounds = Bounds::new(&map.episodes);
         let mut uses: BTreeMap<&str, Vec<Use>> = BTreeMap::new();
         let (mut samplers, mut tracks) = (Vec::new(), Vec::new());
@@ -127,6 +131,7 @@ impl<'r, 'm> Reading<'r, 'm> {
             path,
             map,
             features,
+            observer: observer.as_mut(),
             writer,
             summary,
             uses,
@@ -280,6 +285,9 @@ impl<'r, 'm> Reading<'r, 'm> {
         };
         self.writer.begin_episode(task);
         self.tracks.iter_mut().for_each(|(_, track)| track.begin_episode());
+        if let Some(observer) = &mut self.observer {
+            observer.begin_episode();
+        }
         self.encoders.iter_mut().for_each(|encoder| *encoder = None);
         self.state = State::Open { base, n_rows: 0 };
         Ok(())
@@ -349,6 +357,10 @@ impl<'r, 'm> Reading<'r, 'm> {
                 (Some(Cell::Numbers(before)), Cell::Numbers(more)) => before.extend(more),
                 (_, cell) => cells.push(cell),
             }
+        }
+        if let (Some(observer), Some(Cell::Numbers(numbers))) = (&mut self.observer, cells.first()) {
+            let observed = observer.cells(numbers);
+            cells.splice(0..1, observed);
         }
         Ok(cells)
     }

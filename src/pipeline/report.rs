@@ -4,10 +4,12 @@
 mod gather;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::artifact::StageDir;
+use crate::annotate::ANNOTATION;
+use crate::artifact::{StageDir, sha256_file};
 #[cfg(not(feature = "report"))]
 use crate::feature::{Feature, NotBuiltIn};
 use crate::pipeline::unit::{Amount, Job, Unit, Worker};
@@ -70,6 +72,9 @@ impl Unit for Report<'_> {
             for unit in rollout::units(pipeline) {
                 inputs.insert(format!("{experiment}{}", unit.name()), unit.dir(&run).version()?);
             }
+            for (name, path) in annotations(pipeline, &run) {
+                inputs.insert(format!("{experiment}annotations {name}"), sha256_file(&path)?);
+            }
         }
         Ok(inputs)
     }
@@ -87,4 +92,10 @@ impl Unit for Report<'_> {
     fn open<'j>(&'j self, _job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
         Err(NotBuiltIn(Feature::Report).into())
     }
+}
+
+/// The annotated datasets that a pipeline names, each with what is told of its labels.
+fn annotations(pipeline: &Pipeline, run: &RunDir) -> Vec<(String, PathBuf)> {
+    let named = pipeline.spec.report.annotations.iter();
+    named.map(|name| (name.clone(), run.root().join(name).join(ANNOTATION))).collect()
 }

@@ -282,4 +282,8 @@ impl OrderSpec {
 pub struct ReportSpec {
     /// The page's title; the pipeline's name when left out.
     pub title: Option<String>,
+    /// Datasets that `ntp annotate --against` wrote, relative to the run directory: how well their labels agree with
+    /// true ones is shown.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub annotations: Vec<String>,
 }

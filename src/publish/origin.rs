@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::annotate::{ANNOTATION, Measured};
 use crate::artifact::{IoError, read_json};
 use crate::dataset::DatasetSummary;
 
@@ -17,6 +18,21 @@ pub(super) enum Origin {
         /// By which column.
         column: String,
     },
+    /// A trained model took demonstrations apart.
+    Modelled(Modelled),
+}
+
+/// What `ntp/annotation.json` tells of labels that models made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub(super) struct Modelled {
+    /// The models in words.
+    models: String,
+    /// The day, or nothing.
+    day: String,
+    /// How well the labels agreed with true ones.
+    measured: String,
+    /// What is told of doubtful episodes.
+    doubtful: String,
 }
 
 /// The part of `ntp/info.json` that tells.
@@ -26,11 +42,71 @@ struct Told {
     annotated_by: Option<String>,
 }
 
+/// The part of `ntp/annotation.json` that is told on.
+#[derive(Deserialize)]
+struct AnnotationTold {
+    models: Vec<ModelTold>,
+    #[serde(default)]
+    date: Option<String>,
+    #[serde(default)]
+    doubtful: Option<Vec<serde::de::IgnoredAny>>,
+    #[serde(default)]
+    measured: Option<Measured>,
+}
+
+#[derive(Deserialize)]
+struct ModelTold {
+    name: String,
+    variant: String,
+    #[serde(default)]
+    version: Option<String>,
+    episodes: u64,
+}
+
+impl Modelled {
+    fn of(told: &AnnotationTold) -> Self {
+        let model = |model: &ModelTold| {
+            let version =
+                model.version.as_ref().map(|version| format!(", version `{}`", version.get(..12).unwrap_or(version)));
+            format!("`{}` (variant {}{})", model.name, model.variant, version.unwrap_or_default())
+        };
+        let models: Vec<String> = told.models.iter().filter(|of| of.episodes > 0).map(model).collect();
+        Self {
+            models: models.join(" and "),
+            day: told.date.as_ref().map(|date| format!(" on {date}")).unwrap_or_default(),
+            measured: told.measured.as_ref().map_or_else(|| "Their accuracy was not measured.".to_owned(), in_words),
+            doubtful: told.doubtful.as_ref().map_or_else(String::new, |doubtful| {
+                format!("; `ntp/annotation.json` lists {} doubtful episodes with the reasons", doubtful.len())
+            }),
+        }
+    }
+}
+
+/// A measurement in a sentence.
+fn in_words(measured: &Measured) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let subtasks = measured.levels.get("sub_task").cloned().unwrap_or_default();
+    let f1 = subtasks.boundary_f1.get("0.5").copied().unwrap_or(0.0);
+    format!(
+        "Measured against the true labels of `{}` ({} episodes): {} of the calls have the right program and frames; of the \
+         sub-tasks {} of the frames are right, and the F1 of boundaries within 0.5 s is {f1:.3}.",
+        measured.truth,
+        measured.episodes,
+        percent(measured.call_accuracy()),
+        percent(subtasks.frame_accuracy)
+    )
+}
+
 impl Origin {
     /// That of a dataset.
     pub(super) fn of(dataset: &Path) -> Result<Self, IoError> {
         let told: Told = read_json(&dataset.join("ntp/info.json"))?;
-        Ok(told.annotated_by.map_or(Self::Simulated, |column| Self::Annotated { column }))
+        let annotation = dataset.join(ANNOTATION);
+        Ok(match told.annotated_by {
+            None => Self::Simulated,
+            Some(_) if annotation.is_file() => Self::Modelled(Modelled::of(&read_json(&annotation)?)),
+            Some(column) => Self::Annotated { column },
+        })
     }
 
     pub(super) fn tags(&self) -> &'static [&'static str] {
@@ -39,13 +115,16 @@ impl Origin {
                 &["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning", "synthetic"]
             }
             Self::Annotated { .. } => &["LeRobot", "robotics", "hierarchical", "imitation-learning"],
+            Self::Modelled(_) => {
+                &["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning"]
+            }
         }
     }
 
     /// The hub's word for who made the labels.
     pub(super) fn annotations_creators(&self) -> &'static str {
         match self {
-            Self::Simulated => "machine-generated",
+            Self::Simulated | Self::Modelled(_) => "machine-generated",
             Self::Annotated { .. } => "found",
         }
     }
@@ -69,6 +148,10 @@ impl Origin {
                 "{total_episodes} robot episodes of {total_tasks} tasks, with their annotated sub-tasks as a program tree \
                  of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
             ),
+            Self::Modelled(Modelled { models, .. }) => format!(
+                "{total_episodes} robot episodes of {total_tasks} tasks, taken apart by the model {models} into a \
+                 hierarchy of program calls with arguments, spans and confidences."
+            ),
         }
     }
 
@@ -84,6 +167,10 @@ impl Origin {
                  it. These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
                  how, or how exactly."
             ),
+            Self::Modelled(Modelled { models, day, measured, doubtful }) => format!(
+                "These labels are predictions: the model {models} made them of the demonstrations{day}. Nobody has drawn \
+                 or checked them by hand. {measured} `calls.confidence` tells how sure each call is{doubtful}."
+            ),
         }
     }
 
@@ -97,6 +184,10 @@ impl Origin {
                 "Episodes, videos and statistics are those of the dataset that it was brought in from. Its files do not \
                  tell whether a robot or a simulation acted."
             }
+            Self::Modelled(_) => {
+                "Episodes, videos and observations are those of the dataset that was annotated; who acted is in \
+                 `episodes.actor`, as far as it was known."
+            }
         }
     }
 
@@ -108,7 +199,7 @@ impl Origin {
                  end configuration of an unseen task is among the seen ones. Demonstrations are made of seen tasks; unseen \
                  ones are for evaluation. The column is `episodes.split`, and a task has one split in all of its episodes."
             }
-            Self::Annotated { .. } => {
+            Self::Annotated { .. } | Self::Modelled(_) => {
                 "The column is `episodes.split`. Nothing holds tasks of one split apart from those of another."
             }
         }
@@ -123,7 +214,9 @@ impl Origin {
                 let share = 100.0 * successes as f64 / all.max(1) as f64;
                 format!("{successes} of {all} episodes succeeded ({share:.1} %).")
             }
-            Self::Annotated { .. } => "Demonstrations are taken for successes: nobody has judged them.".to_owned(),
+            Self::Annotated { .. } | Self::Modelled(_) => {
+                "Demonstrations are taken for successes: nobody has judged them.".to_owned()
+            }
         }
     }
 
@@ -143,6 +236,11 @@ impl Origin {
                 "The accuracy of the labels was not measured.".to_owned(),
                 "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
                 format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
+            ],
+            Self::Modelled(Modelled { measured, .. }) => vec![
+                format!("The labels are a model's. {measured}"),
+                format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
+                "Observations are positions of slots, relative to the gripper.".to_owned(),
             ],
         };
         let boundaries =
@@ -164,7 +262,9 @@ impl Origin {
     pub(super) fn default_creator(&self) -> &'static str {
         match self {
             Self::Simulated => "The ntp project",
-            Self::Annotated { .. } => "Unknown: the authors of the dataset that it was brought in from",
+            Self::Annotated { .. } | Self::Modelled(_) => {
+                "Unknown: the authors of the dataset that it was brought in from"
+            }
         }
     }
 
@@ -173,6 +273,7 @@ impl Origin {
         match self {
             Self::Simulated => "ntp convert PIPELINE.toml",
             Self::Annotated { .. } => "ntp dataset import THEIRS",
+            Self::Modelled(_) => "ntp annotate DEMONSTRATIONS --model MODEL",
         }
     }
 
@@ -185,6 +286,10 @@ impl Origin {
             }
             Self::Annotated { .. } => {
                 "`ntp/episodes.parquet` names the file that each episode was read from, by name and hash."
+            }
+            Self::Modelled(_) => {
+                "`ntp/annotation.json` names the models, and `ntp/episodes.parquet` what each episode was read from, by \
+                 name and hash."
             }
         }
     }

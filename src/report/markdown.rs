@@ -6,6 +6,7 @@ use crate::report::chart::distinct;
 use crate::report::chart::scale::short;
 use crate::report::claims::{Claim, Note, Verdict};
 use crate::report::detections::DetectionError;
+use crate::report::section::annotations::{self, LevelRow};
 use crate::report::section::models::{self, ModelRow};
 use crate::report::summary::{Aggregate, FirstError, Report};
 
@@ -39,6 +40,7 @@ pub(super) fn render(report: &Report) -> String {
     };
     put(&COLUMNS, report.aggregates.iter().map(row).collect());
     put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
+    put(&ANNOTATION_COLUMNS, annotations::rows(&report.annotations).into_iter().map(annotation).collect());
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
     put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
     put(&MODEL_COLUMNS, models::models(&report.models).iter().map(model).collect());
@@ -47,6 +49,24 @@ pub(super) fn render(report: &Report) -> String {
         report.notes.iter().for_each(|said| text.push_str(&note(said)));
     }
     text
+}
+
+const ANNOTATION_COLUMNS: [Column<'static>; 9] = [
+    ("annotations", false),
+    ("episodes", true),
+    ("exact", true),
+    ("calls", true),
+    ("level", false),
+    ("frames", true),
+    ("IoU", true),
+    ("F1 at 0.1, 0.5, 1 s", true),
+    ("edit", true),
+];
+
+fn annotation(row: LevelRow) -> Vec<String> {
+    let LevelRow { name, is_first: _, episodes, exact, calls, level, frames, iou, boundary_f1, edit } = row;
+    let f1 = boundary_f1.join(", ");
+    vec![name, episodes.to_string(), exact.to_string(), calls, level, frames, iou, f1, edit]
 }
 
 const DETECTION_COLUMNS: [Column<'static>; 12] = [

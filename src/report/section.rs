@@ -1,6 +1,7 @@
 //! The sections of the page: each is a file that makes words and places of the report, and a template beside it that
 //! says how they look. A section that has nothing to show is empty.
 
+pub(in crate::report) mod annotations;
 mod claims;
 mod detectors;
 mod failures;
@@ -39,7 +40,7 @@ pub(super) struct Contents<'a> {
 }
 
 /// In their order on the page.
-pub(super) const SECTIONS: [Section; 11] = [
+pub(super) const SECTIONS: [Section; 12] = [
     headline::SECTION,
     claims::SECTION,
     figures::SECTION,
@@ -49,6 +50,7 @@ pub(super) const SECTIONS: [Section; 11] = [
     failures::SECTION,
     learning::SECTION,
     detectors::SECTION,
+    annotations::SECTION,
     models::SECTION,
     run::SECTION,
 ];

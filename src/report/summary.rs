@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::annotate::Measured;
 use crate::report::PaperValue;
 use crate::report::actor::{Actor, ModelParts};
 use crate::report::claims::{Claim, Note};
@@ -49,6 +50,9 @@ pub struct Report {
     pub filmstrips: Vec<Filmstrip>,
     /// Errors of detectors in the demonstrations that models behind them were given.
     pub detections: Vec<DetectionError>,
+    /// Labels that models made, held against true ones; absent where the pipeline names none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub annotations: Vec<AnnotationResult>,
     /// The end of each training curve; the whole curves are in curves.csv.
     pub training: Vec<TrainingEnd>,
     /// The trained models.
@@ -63,6 +67,17 @@ pub struct Report {
     pub facts: Vec<Fact>,
     /// What was read.
     pub inputs: Vec<InputFile>,
+}
+
+/// How well the labels of an annotated dataset agree with true ones.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AnnotationResult {
+    /// Of which experiment.
+    pub experiment: String,
+    /// The annotated dataset's folder, as the pipeline names it.
+    pub name: String,
+    /// What was measured.
+    pub measured: Measured,
 }
 
 /// The rollouts of one trained model in one suite.

@@ -201,7 +201,7 @@ impl<'t> Running<'t> {
         let Some(decision) = self.pending.take() else { return };
         let caller = self.calls.top().map_or(Program::None, |top| top.program);
         let number = self.decisions;
-        let Decision { program, scope, argument, end_of_program, prediction } = decision;
+        let Decision { program, scope, argument, argument_probability: _, end_of_program, prediction } = decision;
         if let Err(problem) = check_argument(self.world.scene().slots.len(), program, argument) {
             self.unlawful = Some(TraceError::Call { call: self.calls.len() as u32, problem });
             return;

@@ -215,13 +215,14 @@ impl<N: Network> LearnedPolicy<N> {
             .decoder
             .decode(&labels)
             .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
-        let arguments = self.arguments(reading, query, core, program)?;
+        let (arguments, argument_probability) = self.arguments(reading, query, core, program)?;
         let probabilities =
             |label: ScopingLabel| labels.iter().map(|scores| scores[label as usize].exp()).collect::<Vec<f32>>();
         let decision = Decision {
             program,
             scope: scope.unwrap_or(query.window),
             argument: arguments[0].filter(|_| program.takes_argument()),
+            argument_probability: if program.takes_argument() { argument_probability } else { 1.0 },
             end_of_program: program == Program::None || end_probability >= END_THRESHOLD,
             prediction: Some(Prediction {
                 program_probability,
@@ -233,22 +234,26 @@ impl<N: Network> LearnedPolicy<N> {
         Ok((decision, arguments))
     }
 
-    /// The slots that a program is called with.
+    /// The slots that a program is called with, and how likely the first of them is.
     fn arguments(
         &self,
         reading: &N::Reading,
         query: &Query,
         core: &CoreOutput,
         callee: Program,
-    ) -> Result<Arguments, ReadError> {
-        let mut arguments = Arguments::default();
+    ) -> Result<(Arguments, f32), ReadError> {
+        let (mut arguments, mut first_probability) = (Arguments::default(), 1.0);
         let n_arguments = self.network.scoping().n_arguments_of(callee);
         if n_arguments > 0 {
             let logits = all_finite(self.network.argument(reading, query.program.into(), core), "the argument")?;
             let rows = logits.chunks_exact(query.specification.n_slots.max(1)).take(n_arguments);
-            arguments.iter_mut().zip(rows).for_each(|(slot, row)| *slot = Some(SlotIndex(likeliest(row).0 as u16)));
+            for (number, (slot, row)) in arguments.iter_mut().zip(rows).enumerate() {
+                let (likeliest, probability) = likeliest(row);
+                *slot = Some(SlotIndex(likeliest as u16));
+                first_probability = if number == 0 { probability } else { first_probability };
+            }
         }
-        Ok(arguments)
+        Ok((arguments, first_probability))
     }
 }
 

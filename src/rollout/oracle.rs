@@ -30,6 +30,7 @@ impl Oracle {
                 program: call.program,
                 scope: call.output.filter(|_| call.program.is_composite()).unwrap_or(query.window),
                 argument: call.argument,
+                argument_probability: 1.0,
                 end_of_program: call.end_of_program,
                 prediction: None,
             },

@@ -60,6 +60,8 @@ pub struct Decision {
     pub scope: Span,
     /// For `move_to`.
     pub argument: Option<SlotIndex>,
+    /// How likely the argument is among all; 1 without one, and where nothing is weighed.
+    pub argument_probability: f32,
     /// Whether the running program ends with this step.
     pub end_of_program: bool,
     /// The probabilities behind it, for viewers; `None` where there are none.
@@ -135,7 +137,14 @@ pub enum PolicyError {
 impl Decision {
     /// To call nothing and end.
     pub fn end(query: &Query) -> Self {
-        Self { program: Program::None, scope: query.window, argument: None, end_of_program: true, prediction: None }
+        Self {
+            program: Program::None,
+            scope: query.window,
+            argument: None,
+            argument_probability: 1.0,
+            end_of_program: true,
+            prediction: None,
+        }
     }
 }
 
@@ -161,6 +170,13 @@ impl Specification {
         let said = instructions(&episode.calls, &episode.scene.slots);
         let rows = SpecificationRows::Sentences(said.iter().map(|instruction| instruction.words).collect());
         Self { rows, ..Self::of(episode) }
+    }
+
+    /// Observations of a demonstration of a task without a name.
+    pub fn observed(rows: ObservationRows) -> Self {
+        let n_slots = rows.n_slots();
+        let (task_id, pictures) = (String::new(), Pictures::default());
+        Self { task_id, n_slots, rows: SpecificationRows::Observations(rows), pictures }
     }
 
     /// The boundary frames of an episode.

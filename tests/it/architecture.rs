@@ -29,6 +29,7 @@ const ORDER: &[&str] = &[
     "model",
     "training",
     "rollout",
+    "annotate",
     "deploy",
     "visualize",
     "report",
@@ -125,7 +126,9 @@ const DATASET_ORDER: &[&str] = &[
     "validate",
     "edit",
     "export",
+    "labelled",
     "import",
+    "relabel",
 ];
 
 /// What a file of `dataset` uses of it: the paths behind `crate::dataset::`, without names of types.

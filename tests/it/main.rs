@@ -1,6 +1,8 @@
 //! The one integration binary. Each module is named for what its tests claim something about.
 
 #[cfg(test)]
+mod annotate;
+#[cfg(test)]
 mod architecture;
 #[cfg(test)]
 mod arm;
@@ -110,3 +112,5 @@ mod variant;
 mod video;
 #[cfg(test)]
 mod visualize;
+#[cfg(test)]
+mod your_data;

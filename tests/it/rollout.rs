@@ -206,6 +206,7 @@ fn primitives_called_by_the_root_do_what_the_hierarchy_does() {
         program: call.program,
         scope: call.input,
         argument: call.argument,
+        argument_probability: 1.0,
         end_of_program: false,
         prediction: None,
     };

@@ -25,7 +25,7 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
         let problem = format!("schema_version is {}, but {NTP_VERSION} is edited", ntp.schema_version);
         return refused("edit.version", layout::NTP_INFO, problem);
     }
-    if ntp.annotated_by.is_none() && KnownPrograms::of_hash(&ntp.vocabulary_hash).is_none() {
+    if ntp.has_our_programs() && KnownPrograms::of_hash(&ntp.vocabulary_hash).is_none() {
         let problem = "vocabulary_hash: its programs are not those of this version".to_owned();
         return refused("edit.vocabulary", layout::NTP_INFO, problem);
     }

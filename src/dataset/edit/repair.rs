@@ -119,7 +119,8 @@ impl Prefix {
         let source = Source::with_rows(root, info, rows)?;
         check_version(&source)?;
         if let Some(by) = &source.ntp.annotated_by {
-            let problem = format!("its programs are annotated by {by}: import the dataset that it was made of again");
+            let problem =
+                format!("its programs are annotated by {by}: make it again of the dataset that it was made of");
             return Err(EditError::refused("edit.vocabulary", &root.join(layout::NTP_INFO), problem));
         }
         Ok(Self { source, checks, changed })

@@ -15,12 +15,12 @@ use crate::trace::{ProgramCall, sentence};
 
 /// A label and the frames that have it, half-open.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Label {
+pub(crate) struct Label {
     /// Which call.
-    pub(super) call: usize,
-    pub(super) text: String,
-    pub(super) begin: u32,
-    pub(super) end: u32,
+    pub(crate) call: usize,
+    pub(crate) text: String,
+    pub(crate) begin: u32,
+    pub(crate) end: u32,
 }
 
 /// An episode with its calls.

@@ -23,15 +23,15 @@ use crate::dataset::files::info::FeatureInfo;
 use crate::dataset::files::layout;
 use crate::dataset::schema::META_EPISODES;
 
-const PERSISTENT: &str = "language_persistent";
-const EVENTS: &str = "language_events";
+pub(crate) const PERSISTENT: &str = "language_persistent";
+pub(crate) const EVENTS: &str = "language_events";
 
 /// Something that holds from a moment on, until something of its style follows.
 #[derive(Clone, Debug, PartialEq)]
-struct Entry {
-    timestamp: f32,
-    style: &'static str,
-    content: String,
+pub(crate) struct Entry {
+    pub(crate) timestamp: f32,
+    pub(crate) style: &'static str,
+    pub(crate) content: String,
 }
 
 /// Writes the dataset with both columns.
@@ -108,13 +108,17 @@ fn entries(episode: &LabelledEpisode, fps: u32) -> Vec<Entry> {
 }
 
 /// `1. pick_and_place block_D block_B`, a line each.
-fn numbered(labels: &[Label]) -> String {
+pub(crate) fn numbered(labels: &[Label]) -> String {
     let lines = labels.iter().enumerate().map(|(at, label)| format!("{}. {}", at + 1, label.text));
     lines.collect::<Vec<_>>().join("\n")
 }
 
 /// Both columns: `positions` of the entries of all rows, `lengths` of each row.
-fn columns(entries: &[Entry], positions: Vec<u32>, lengths: &[usize]) -> Result<Vec<(Field, ArrayRef)>, ArrowError> {
+pub(crate) fn columns(
+    entries: &[Entry],
+    positions: Vec<u32>,
+    lengths: &[usize],
+) -> Result<Vec<(Field, ArrayRef)>, ArrowError> {
     let texts =
         |text: fn(&Entry) -> &str| -> ArrayRef { Arc::new(StringArray::from_iter_values(entries.iter().map(text))) };
     let none = |field: &Field| new_null_array(field.data_type(), entries.len());

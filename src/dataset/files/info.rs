@@ -175,7 +175,18 @@ pub(crate) struct NtpInfo {
     pub(crate) total_calls: u64,
     pub(crate) total_scopes: u64,
     pub(crate) failed_left_out: u64,
-    /// What its programs were read from where they were annotated elsewhere: they are texts then.
+    /// What its programs were read from where they were annotated elsewhere: they are texts then, unless it was
+    /// [`BY_MODEL`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) annotated_by: Option<String>,
+}
+
+/// What `annotated_by` says of a dataset whose calls are what a model of ours made of demonstrations.
+pub(crate) const BY_MODEL: &str = "model";
+
+impl NtpInfo {
+    /// Whether its calls are of our programs. Else they are texts, as runs of frames that share none.
+    pub(crate) fn has_our_programs(&self) -> bool {
+        self.annotated_by.as_ref().is_none_or(|by| by == BY_MODEL)
+    }
 }

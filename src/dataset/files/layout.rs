@@ -14,6 +14,8 @@ pub(crate) const TASKS: &str = "meta/tasks.parquet";
 pub(crate) const SUBTASKS: &str = "meta/subtasks.parquet";
 /// What the program tables are made of.
 pub(crate) const NTP_INFO: &str = "ntp/info.json";
+/// How labels were made that models made.
+pub(crate) const ANNOTATION: &str = "ntp/annotation.json";
 /// Provenance of each episode.
 pub(crate) const EPISODES: &str = "ntp/episodes.parquet";
 /// The card of a published dataset.

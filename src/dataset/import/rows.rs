@@ -145,7 +145,7 @@ fn annotated_calls<'t>(episode: &Annotated, subtasks: &'t [String]) -> Vec<Annot
 }
 
 /// Names a task by its text, so that it has one name in all datasets.
-fn task_id(text: &str) -> String {
+pub(in crate::dataset) fn task_id(text: &str) -> String {
     format!("task_{}", &sha256_bytes(text.as_bytes())[..12])
 }
 

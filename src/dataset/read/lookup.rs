@@ -154,7 +154,7 @@ fn find_frame(root: &Path, found: &Found, calls: &[CallFacts], frame: u64) -> Re
     }
     let frame = frame as i64;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
-    if ntp.annotated_by.is_none() {
+    if ntp.has_our_programs() {
         return read_frame(root, found, frame, |batch: &FrameBatch, at| FrameFacts {
             frame_index: frame,
             index: batch.index[at],

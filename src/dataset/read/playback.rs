@@ -85,12 +85,12 @@ pub fn play_back(root: &Path, episode: u64) -> Result<Playback, DatasetError> {
     let found = find(root, episode)?;
     let calls = read_calls(root, &found)?;
     // Our own calls share the frame at which one ends and the next begins; spans that were annotated elsewhere do not.
-    let is_shared = ntp.annotated_by.is_none();
+    let is_shared = ntp.has_our_programs();
     let until = |[begin, end]: [u32; 2]| {
         [begin, if is_shared { end.saturating_sub(1).max(begin.saturating_add(1)) } else { end }]
     };
     let running = calls.iter().map(|call| until(call.frames)).collect();
-    if is_shared {
+    if ntp.annotated_by.is_none() {
         check_pictures(root, episode)?;
     }
     let frames = Frames::read(root, &found.row, found.frames_before)?;

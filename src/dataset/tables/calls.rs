@@ -5,9 +5,9 @@ pub(crate) mod facts;
 pub(crate) mod read;
 
 use crate::dataset::tables::annotated::AnnotatedCall;
-use crate::dataset::tables::view::EpisodeView;
+use crate::dataset::tables::view::{CallSpans, EpisodeView};
 use crate::table::{TableRows as _, table};
-use crate::trace::sentence;
+use crate::trace::{ProgramCall, sentence};
 
 table! {
     /// `ntp/calls/chunk-*/file-*.parquet`: a row a program call, in the order of calling, a caller before its callees. One step of Algorithm 1 of the paper.
@@ -52,9 +52,19 @@ table! {
 impl Rows {
     /// Adds an episode's calls.
     pub(crate) fn append_episode(&mut self, view: &EpisodeView<'_>, episode_index: i64) {
-        let (calls, scene) = (&view.episode.calls, &view.episode.scene);
-        let name = |slot: usize| scene.slots[slot].name.as_str();
-        for (position, (call, spans)) in calls.iter().zip(view.spans).enumerate() {
+        let scene = &view.episode.scene;
+        self.append_tree(&view.episode.calls, view.spans, |slot| scene.slots[slot].name.as_str(), episode_index);
+    }
+
+    /// Adds a tree of calls, their spans counted in rows; `name` names the slots.
+    pub(crate) fn append_tree<'n>(
+        &mut self,
+        calls: &[ProgramCall],
+        spans: &[CallSpans],
+        name: impl Fn(usize) -> &'n str,
+        episode_index: i64,
+    ) {
+        for (position, (call, spans)) in calls.iter().zip(spans).enumerate() {
             self.push(Row {
                 episode_index,
                 call_id: i64::from(call.id.0),
@@ -71,7 +81,7 @@ impl Rows {
                 frame_begin: i64::from(spans.frames.begin),
                 frame_end: i64::from(spans.frames.end),
                 end_of_program: call.end_of_program,
-                instruction: sentence(calls, position, name).map(Into::into),
+                instruction: sentence(calls, position, &name).map(Into::into),
             });
         }
     }

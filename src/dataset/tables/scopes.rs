@@ -5,9 +5,9 @@ pub(crate) mod check;
 use std::iter::repeat_n;
 
 use crate::dataset::tables::annotated::AnnotatedCall;
-use crate::dataset::tables::view::EpisodeView;
+use crate::dataset::tables::view::{CallSpans, EpisodeView};
 use crate::table::table;
-use crate::trace::{ScopingLabel, Span};
+use crate::trace::{ProgramCall, ScopingLabel, Span};
 
 table! {
     /// `ntp/scopes/chunk-*/file-*.parquet`: a row for each call that has a scope and each frame of its caller's window: what a network learns to put out for each frame.
@@ -32,8 +32,13 @@ table! {
 impl Rows {
     /// Adds an episode's labels; returns how many.
     pub(crate) fn append_episode(&mut self, view: &EpisodeView<'_>, episode_index: i64) -> usize {
+        self.append_tree(&view.episode.calls, view.spans, episode_index)
+    }
+
+    /// Adds the labels of a tree of calls, their spans counted in rows; returns how many.
+    pub(crate) fn append_tree(&mut self, calls: &[ProgramCall], spans: &[CallSpans], episode_index: i64) -> usize {
         let before = self.call_id.len();
-        for (call, spans) in view.episode.calls.iter().zip(view.spans) {
+        for (call, spans) in calls.iter().zip(spans) {
             if let Some(output) = spans.output {
                 self.append_call(i64::from(call.id.0), spans.input, output);
             }

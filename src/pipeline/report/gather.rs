@@ -3,13 +3,13 @@
 use crate::model;
 use crate::pipeline::costs::{Costs, UnitCost};
 use crate::pipeline::filmstrips::{self, Rollouts};
-use crate::pipeline::report::Report;
+use crate::pipeline::report::{Report, annotations};
 use crate::pipeline::unit::{Job, Made, Unit as _, Worker};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, detections, rollout, tasks, train, upstream};
 use crate::render::{CameraConfig, Randomization};
 use crate::report::{
-    self, DetectionsInput, Fact, Filmstrip, MetricsInput, ModelParts, ModelSummary, ReportInputs, RolloutsInput,
-    StageCost, paper_values,
+    self, AnnotationsInput, DetectionsInput, Fact, Filmstrip, MetricsInput, ModelParts, ModelSummary, ReportInputs,
+    RolloutsInput, StageCost, paper_values,
 };
 use crate::rollout::ModelFacts;
 use crate::task::Split;
@@ -61,6 +61,10 @@ fn gather(pipeline: &Pipeline, run: &RunDir, inputs: &mut ReportInputs) -> Resul
             inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
         }
     }
+    inputs.annotations.extend(annotations(pipeline, run).into_iter().map(|(name, path)| {
+        let experiment = experiment.clone();
+        AnnotationsInput { experiment, name, path }
+    }));
     let costs = Costs::read(run)?;
     inputs.metrics.extend(trainings(pipeline, run, &costs)?);
     inputs.facts.extend(facts(pipeline, run)?);

@@ -79,12 +79,11 @@ impl Target {
     }
 
     fn ntp_info(&self, slots: Vec<String>, failed_left_out: u64) -> NtpInfo {
-        let (vocabulary, vocabulary_hash) = match &self.ntp.annotated_by {
-            Some(_) => vocabulary(self.subtasks.texts()),
-            None => {
-                let known = self.known_programs();
-                (known.names().map(ToOwned::to_owned).collect(), known.hash())
-            }
+        let (vocabulary, vocabulary_hash) = if self.ntp.has_our_programs() {
+            let known = self.known_programs();
+            (known.names().map(ToOwned::to_owned).collect(), known.hash())
+        } else {
+            vocabulary(self.subtasks.texts())
         };
         NtpInfo {
             vocabulary,

@@ -1,0 +1,235 @@
+//! The ends of primitives, found in how gripper and objects move.
+//!
+//! A gripper that closes or opens ends a primitive. Between two such moments it goes to another place and stops above
+//! it, before it goes down: the last frame before the way down is the other kind of key frame.
+//!
+//! # Units and frames
+//!
+//! Metres and seconds. Heights are along the world's z axis.
+
+use crate::dataset::ObservedEpisode;
+use crate::trace::ObservationRows;
+
+/// Which rows of a dataset are key frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeyFrames {
+    /// All of a dataset that holds ends of primitives alone; those that are found in another.
+    #[default]
+    Auto,
+    /// All.
+    Rows,
+    /// Those that are found.
+    Found,
+}
+
+/// A gripper nearer to where it closed or opened than this has not left, in metres. Less than a primitive ever moves.
+const STILL_M: f32 = 0.004;
+/// What is this far beside the place of the next grip or release is still on its way there, in metres.
+const BESIDE_M: f32 = 0.03;
+/// The farthest that a gripper shifts between hovering and going down, in metres: within a container.
+const SHIFT_M: f32 = 0.12;
+/// A gripper pauses where it is so much slower than before and after.
+const PAUSE_PACE: f32 = 0.5;
+/// The least height from which a gripper goes down to a thing, in metres.
+const WAY_DOWN_M: f32 = 0.015;
+/// A change of the gripper that lasts shorter is a flicker, in frames.
+const FLICKER_FRAMES: usize = 2;
+
+/// A key frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyFrame {
+    /// Which frame of the episode.
+    pub frame: u32,
+    /// Whether the gripper is closed then. A frame that was taken a moment before it closes stands for the moment.
+    pub closed: bool,
+}
+
+/// The key frames of an episode, in order: the first frame, then the ends of primitives.
+pub fn key_frames(episode: &ObservedEpisode) -> Vec<KeyFrame> {
+    let path = gripper_path(episode);
+    let closed: Vec<bool> = episode.observations.iter().map(|row| !row.is_open()).collect();
+    let mut keys = vec![KeyFrame { frame: 0, closed: closed.first().copied().unwrap_or(false) }];
+    let changes = changes(&closed);
+    for (number, &change) in changes.iter().enumerate() {
+        let begin = keys.last().map_or(0, |key| key.frame as usize);
+        let until = changes.get(number + 1).map_or(path.len(), |&next| next);
+        let place = resting(&path, begin, change);
+        let end = leaves(&path, place, until).max(place);
+        let hover = hover(&path, begin, place);
+        if hover > begin && hover < end {
+            keys.push(KeyFrame { frame: hover as u32, closed: closed[change - 1] });
+        }
+        if end > begin {
+            keys.push(KeyFrame { frame: end as u32, closed: closed[change] });
+        }
+    }
+    keys
+}
+
+/// The frame at which the gripper is where it changes: at it or right before, wherever it moves less.
+fn resting(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
+    let pace = |frame: usize| {
+        let to = path.get(frame + 1).map_or(0.0, |&next| distance_m(path[frame], next));
+        let from = frame.checked_sub(1).map_or(0.0, |before| distance_m(path[before], path[frame]));
+        to.min(from)
+    };
+    let is_before = change > begin + 1 && path[change - 1][2] < path[change][2] - STILL_M / 2.0;
+    if is_before && pace(change - 1) <= pace(change) { change - 1 } else { change }
+}
+
+/// Where the gripper is in each frame. Where it is not told, it is the opposite of how most objects move past it, from
+/// where it was in the first frame.
+fn gripper_path(episode: &ObservedEpisode) -> Vec<[f32; 3]> {
+    if episode.grippers_m.len() == episode.n_frames() {
+        return episode.grippers_m.clone();
+    }
+    let rows = &episode.observations;
+    let mut at = [0.0; 3];
+    let mut path = vec![at; rows.len().min(1)];
+    for frame in 1..rows.len() {
+        let moved = [0, 1, 2].map(|axis| median_step(rows, frame, axis));
+        at = [0, 1, 2].map(|axis| at[axis] - moved[axis]);
+        path.push(at);
+    }
+    path
+}
+
+/// How far the objects moved since the frame before, along an axis: the median, as few of them are carried.
+fn median_step(rows: &ObservationRows, frame: usize, axis: usize) -> f32 {
+    let (Some(before), Some(now)) = (rows.get(frame - 1), rows.get(frame)) else { return 0.0 };
+    let steps = before.positions.iter().zip(now.positions).map(|(before, now)| now[axis] - before[axis]);
+    let mut steps: Vec<f32> = steps.collect();
+    steps.sort_by(f32::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The frames at which the gripper has closed or opened, for longer than a flicker.
+fn changes(closed: &[bool]) -> Vec<usize> {
+    let mut state = closed.first().copied().unwrap_or(false);
+    let mut changes = Vec::new();
+    for frame in 1..closed.len() {
+        let lasts = closed[frame..].iter().take(FLICKER_FRAMES).all(|&now| now != state);
+        if lasts {
+            state = !state;
+            changes.push(frame);
+        }
+    }
+    changes
+}
+
+fn distance_m(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
+}
+
+fn beside_m(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The last frame of those behind `change` and before `until` at which the gripper is where it changed.
+fn leaves(path: &[[f32; 3]], change: usize, until: usize) -> usize {
+    let Some(&place) = path.get(change) else { return change };
+    let stays = path[change..until].iter().take_while(|&&at| distance_m(at, place) < STILL_M).count();
+    change + stays.max(1) - 1
+}
+
+/// The frame behind `begin` at which the gripper hovers, before it goes down to where it changes.
+fn hover(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
+    let Some(&place) = path.get(change) else { return change };
+    let is_hover = |&frame: &usize| path[frame][2] - place[2] >= WAY_DOWN_M && beside_m(path[frame], place) < SHIFT_M;
+    let height_mm = |frame: usize| (path[frame][2] / STILL_M).round() as i32;
+    // The lowest, as it may pause above everything on its way too; of these the first, as it may shift before it goes
+    // down.
+    let lowest =
+        pauses(path, begin, change).into_iter().filter(is_hover).min_by_key(|&frame| (height_mm(frame), frame));
+    lowest.unwrap_or_else(|| way_down(path, begin, change)).clamp((begin + 1).min(change), change)
+}
+
+/// The last frame from which the gripper only goes down to where it changes.
+fn way_down(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
+    let place = path[change];
+    let goes_down =
+        |frame: usize| beside_m(path[frame], place) < BESIDE_M && path[frame][2] >= path[frame + 1][2] - STILL_M / 4.0;
+    let top = (begin..change).rev().take_while(|&frame| goes_down(frame)).last().unwrap_or(change);
+    let is_up = |&frame: &usize| path[frame][2] > path[top][2] - STILL_M;
+    (top..change).take_while(is_up).last().unwrap_or(top)
+}
+
+/// The frames between two at which the gripper pauses: slower than the frames around it, and far slower than the
+/// fastest ones before and behind.
+fn pauses(path: &[[f32; 3]], begin: usize, end: usize) -> Vec<usize> {
+    let steps: Vec<f32> = (begin..end).map(|frame| distance_m(path[frame], path[frame + 1])).collect();
+    // The pace at a frame, from the steps to it and from it.
+    let paces: Vec<f32> = steps.windows(2).map(|steps| steps[0] + steps[1]).collect();
+    let fastest = |paces: &[f32]| paces.iter().copied().fold(0.0, f32::max);
+    let is_pause = |&at: &usize| {
+        let slow = PAUSE_PACE * fastest(&paces[..at]).min(fastest(&paces[at + 1..]));
+        paces[at] <= slow && paces[at] <= paces[at - 1] && paces[at] < paces[at + 1]
+    };
+    (1..paces.len().saturating_sub(1)).filter(is_pause).map(|at| begin + at + 1).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{changes, key_frames, pauses};
+    use crate::dataset::ObservedEpisode;
+    use crate::trace::{Observation, ObservationRows};
+
+    /// Minimum jerk from one place to another, sampled.
+    fn go(path: &mut Vec<[f32; 3]>, to: [f32; 3], n: usize) {
+        let from = *path.last().unwrap();
+        for step in 1..=n {
+            let s = step as f32 / n as f32;
+            let share = s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
+            path.push([0, 1, 2].map(|axis| from[axis] + share * (to[axis] - from[axis])));
+        }
+    }
+
+    /// Up, across, down to hovering, down to the block at (0.3, 0.1): the frames of hovering, of closing, and all.
+    fn grasp() -> (usize, usize, ObservedEpisode) {
+        let mut path = vec![[0.0, 0.0, 0.1]];
+        go(&mut path, [0.0, 0.0, 0.3], 8);
+        go(&mut path, [0.3, 0.1, 0.3], 12);
+        go(&mut path, [0.3, 0.1, 0.15], 6);
+        let hover = path.len() - 1;
+        go(&mut path, [0.3, 0.1, 0.045], 6);
+        let closing = path.len() - 1;
+        for _ in 0..3 {
+            path.push(path[closing]);
+        }
+        let closed = closing + 2;
+        go(&mut path, [0.3, 0.1, 0.3], 8);
+        let blocks = [[0.3, 0.1, 0.025], [-0.2, 0.2, 0.025], [0.1, -0.3, 0.025]];
+        let observe = |(frame, at): (usize, &[f32; 3])| Observation {
+            slots_m: blocks.map(|block: [f32; 3]| [0, 1, 2].map(|axis| block[axis] - at[axis])).to_vec(),
+            closed: frame >= closed,
+        };
+        let observations: Vec<Observation> = path.iter().enumerate().map(observe).collect();
+        let times_secs = (0..path.len()).map(|frame| frame as f64 / 10.0).collect();
+        let observations = ObservationRows::of(3, &observations);
+        let (task_text, grippers_m) = (String::new(), Vec::new());
+        let episode = ObservedEpisode { episode_index: 0, task_text, observations, grippers_m, times_secs };
+        (hover, closing + 3, episode)
+    }
+
+    #[test]
+    fn a_grasp_has_the_frame_of_hovering_and_the_frame_before_the_gripper_leaves() {
+        let (hover, leaves, episode) = grasp();
+        let keys = key_frames(&episode).into_iter().map(|key| (key.frame as usize, key.closed));
+        assert_eq!(keys.collect::<Vec<_>>(), [(0, false), (hover, false), (leaves, true)]);
+    }
+
+    #[test]
+    fn a_flicker_of_the_gripper_is_no_change() {
+        assert_eq!(changes(&[false, false, true, false, true, true, true, false, false]), [4, 7]);
+        assert_eq!(changes(&[]), [0; 0]);
+    }
+
+    #[test]
+    fn a_stop_between_two_ways_is_a_pause() {
+        let mut path = vec![[0.0; 3]];
+        go(&mut path, [0.2, 0.0, 0.0], 7);
+        go(&mut path, [0.2, 0.0, -0.1], 5);
+        assert_eq!(pauses(&path, 0, path.len() - 1), [7]);
+        assert_eq!(pauses(&path[..1], 0, 0), [0; 0]);
+    }
+}
