@@ -1,7 +1,7 @@
 //! The arm above the gripper: its collision capsules, painted as the maker paints them.
 
 use crate::arm::{BASE_IN_WORLD_M, Capsule, capsules};
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::Pose;
 use crate::render::look::linear;
 use crate::render::mesh::{Mesh, Paint, Surface};
 
@@ -19,8 +19,10 @@ const N_SIDES: usize = 24;
 const N_RINGS: usize = 6;
 /// Radius of the pedestal that the base stands on.
 const PEDESTAL_M: f32 = 0.11;
-/// The last link's parts: the body of the gripper.
-const LAST_LINK: usize = 7;
+/// Shoulder, upper arm and forearm.
+const RED_LINKS: [usize; 3] = [1, 3, 5];
+/// From here up the first link is the head.
+const HEAD_M: f64 = 0.3;
 
 /// All parts.
 pub(super) fn parts() -> Vec<ArmPart> {
@@ -33,12 +35,10 @@ fn part(capsule: &Capsule) -> ArmPart {
     ArmPart { link: capsule.link, in_link, mesh: rounded(capsule.radius_m as f32, length_m, paint(capsule)) }
 }
 
-/// Long parts are red, joints and gripper dark.
+/// The long links are red; joints, head and gripper are dark.
 fn paint(capsule: &Capsule) -> Paint {
-    let length_m =
-        (Vec3::from(capsule.to_m.map(|at| at as f32)) - Vec3::from(capsule.from_m.map(|at| at as f32))).norm();
-    let is_red = capsule.link > 0 && capsule.link < LAST_LINK && length_m > 0.13;
-    let color = if is_red { linear([150, 30, 34]) } else { linear([58, 60, 66]) };
+    let is_red = RED_LINKS.contains(&capsule.link) && capsule.from_m[2] < HEAD_M;
+    let color = if is_red { linear([158, 32, 36]) } else { linear([58, 60, 66]) };
     Paint { color, gloss: 0.35 }
 }
 

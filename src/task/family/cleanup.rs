@@ -101,7 +101,8 @@ const ASIDE_PITCH_M: f32 = 0.2;
 const BENCH: Bench = Bench {
     table_half_m: [0.95, 0.75],
     poses: bench_poses,
-    front_view: FrontView { eye_m: [0.05, -2.0, 1.7], target_m: [-0.2, 0.02, 0.1] },
+    // From the other side, where the tray is not behind the arm.
+    front_view: FrontView { eye_m: [0.05, 2.15, 1.75], target_m: [-0.27, 0.06, 0.12] },
 };
 const BENCH_BASE_X_M: f32 = -0.62;
 /// Of an arc: radius, how many cells, and how far they are apart in degrees.

@@ -118,7 +118,7 @@ const PART_JITTER_M: f32 = 0.012;
 const BENCH: Bench = Bench {
     table_half_m: [0.8, 0.65],
     poses: bench_poses,
-    front_view: FrontView { eye_m: [0.1, -1.75, 1.4], target_m: [-0.2, 0.0, 0.15] },
+    front_view: FrontView { eye_m: [0.1, -1.95, 1.5], target_m: [-0.22, 0.0, 0.2] },
 };
 const BENCH_CELLS: [usize; 2] = [3, 5];
 const BENCH_CENTER_X_M: f32 = -0.02;

@@ -63,7 +63,7 @@ const CONTAINER_WALL_M: f32 = 0.005;
 const BENCH: Bench = Bench {
     table_half_m: [0.85, 0.75],
     poses: bench_poses,
-    front_view: FrontView { eye_m: [0.1, -1.9, 1.6], target_m: [-0.2, 0.0, 0.12] },
+    front_view: FrontView { eye_m: [0.1, -1.95, 1.65], target_m: [-0.22, 0.0, 0.14] },
 };
 const BENCH_CELLS: [usize; 2] = [5, 8];
 const BENCH_PITCH_M: f32 = 0.075;

@@ -65,7 +65,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
 const BENCH: Bench = Bench {
     table_half_m: [0.8, 0.6],
     poses,
-    front_view: FrontView { eye_m: [0.1, -1.62, 1.2], target_m: [-0.2, 0.0, 0.22] },
+    front_view: FrontView { eye_m: [0.1, -1.8, 1.25], target_m: [-0.2, 0.0, 0.28] },
 };
 
 /// How many blocks there are, left out or not.
