@@ -63,7 +63,7 @@ fn an_arm_acts_through_every_stage_and_is_simulated_again() {
         out.join("rollouts/oracle/with_arm/recordings/shard-00000-of-00001.mcap"),
         out.join("rollouts/oracle/with_gripper/recordings/shard-00000-of-00001.mcap"),
     ] {
-        let (code, stdout, stderr) = run(&["replay", &text(&recording), "--verify"]);
+        let (code, stdout, stderr) = run(&["replay", &text(&recording), "--episode", "0", "--verify"]);
         assert_eq!(code, 0, "{}: {stdout} {stderr}", recording.display());
     }
     let (code, stdout, stderr) = run(&[

@@ -134,7 +134,7 @@ impl Tables {
         let (episode_index, first_index) = (places.episode_index, places.first_index);
         let first_row = self.frames.n_rows();
         self.frames.append(view, EpisodeIds { episode_index, first_index, task_index, fps });
-        self.statistics.append(&self.frames.columns(), &(first_row..self.frames.n_rows()));
+        self.statistics.append(&self.frames.numbers(), &(first_row..self.frames.n_rows()));
         self.calls.append_episode(view, episode_index);
         self.provenance.append_episode(view, source, places);
         self.meta.append_episode(view, places, self.meta_files.place());
@@ -181,7 +181,7 @@ impl Tables {
 
     fn write_frames(&mut self) -> Result<(), ConvertError> {
         let columns = self.frames.columns();
-        self.statistics.keep(&columns, self.frames.n_rows())?;
+        self.statistics.keep(&self.frames.numbers(), self.frames.n_rows())?;
         let columns: Vec<(&str, Values<'_>)> = columns.into_iter().chain(self.pictures.data_columns()).collect();
         self.data_files.write(|file| file.write_row_group(&columns))?;
         self.frames.clear();

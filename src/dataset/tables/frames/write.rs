@@ -158,6 +158,11 @@ impl FrameRows {
         self.rows.columns().into_iter().chain(joints).collect()
     }
 
+    /// The columns that have statistics, in the order of the features that have some.
+    pub(crate) fn numbers(&self) -> Vec<(&'static str, Values<'_>)> {
+        self.columns().into_iter().filter(|(_, values)| !matches!(values, Values::Word(..))).collect()
+    }
+
     /// Forgets all rows, but not the texts.
     pub(crate) fn clear(&mut self) {
         self.rows.clear();
