@@ -21,7 +21,9 @@ mod lanes;
 mod mp4;
 mod picture;
 mod png;
+mod remux;
 mod seek;
+mod track;
 
 pub use clip::{Clip, ClipConfig, write_gif, write_mp4, write_png};
 pub use error::VideoError;
@@ -32,4 +34,6 @@ pub use jpeg::encode_jpeg;
 pub use mp4::{Mp4Reader, Mp4Sample, Mp4Writer};
 pub use picture::{decode_picture, picture_size};
 pub use png::{Rgb, decode_png, encode_png};
+pub use remux::Mp4Remux;
 pub use seek::Mp4Pictures;
+pub use track::{TrackSample, VideoTrackFile};
