@@ -7,7 +7,8 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
 use crate::cluster::Engine;
-use crate::dataset::edit::Ending;
+use crate::dataset::LabelsForm;
+use crate::dataset::edit::{Ending, EpisodeRange};
 use crate::dataset::export::LabelForm;
 use crate::model::ComputeDevice;
 use crate::pipeline::{ItemRanges, Stage};
@@ -15,7 +16,7 @@ use crate::publish::{Date, License, Place, Release};
 use crate::remote::Address;
 use crate::render::Channel;
 use crate::robot::RobotKind;
-use crate::task::{Family, Split};
+use crate::task::Family;
 
 /// Hierarchical robot demonstrations with true labels: made, learned from, acted and judged by one pipeline file.
 ///
@@ -642,8 +643,12 @@ pub enum DatasetCommand {
 /// `ntp dataset import`.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    /// A `LeRobotDataset` v3.0 with `subtask_index` and `meta/subtasks.parquet`.
+    /// A `LeRobotDataset` v3.0 with labels below the task.
     pub dataset: PathBuf,
+    /// The form of the labels: `subtask_index` (with `meta/subtasks.parquet` or without), language (`LeRobot`'s
+    /// `language_persistent`), sarm, or behavior (BEHAVIOR-1K's annotation files). Without it, what the dataset has.
+    #[arg(long, value_name = "FORM")]
+    pub labels: Option<LabelsForm>,
     /// The new folder.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
@@ -679,6 +684,10 @@ pub struct MergeArgs {
     /// The new folder.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
+    /// Decode and encode again the H.264 videos of episodes that begin at no key frame, instead of refusing them. Of
+    /// datasets of others; all other pictures are copied as they are.
+    #[arg(long)]
+    pub reencode: bool,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -704,15 +713,22 @@ pub struct FilterArgs {
     /// How the episode ended: success, failure, or a cause of failure.
     #[arg(long, value_name = "OUTCOME")]
     pub outcome: Vec<Ending>,
-    /// Whether the task is seen or unseen.
+    /// The split: seen or unseen; of datasets of others a name that `meta/info.json` gives, such as train.
     #[arg(long, value_name = "SPLIT")]
-    pub split: Option<Split>,
+    pub split: Option<String>,
+    /// Numbers of episodes, such as 0-9,12.
+    #[arg(long, value_name = "RANGES", value_delimiter = ',')]
+    pub episodes: Vec<EpisodeRange>,
     /// The least number of frames.
     #[arg(long, value_name = "N")]
     pub min_frames: Option<u64>,
     /// The greatest number of frames.
     #[arg(long, value_name = "N")]
     pub max_frames: Option<u64>,
+    /// Decode and encode again the H.264 videos of episodes that begin at no key frame, instead of refusing them. Of
+    /// datasets of others; all other pictures are copied as they are.
+    #[arg(long)]
+    pub reencode: bool,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -739,6 +755,10 @@ pub struct SplitArgs {
     /// With --shares: the seed of the draw.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Decode and encode again the H.264 videos of episodes that begin at no key frame, instead of refusing them. Of
+    /// datasets of others; all other pictures are copied as they are.
+    #[arg(long)]
+    pub reencode: bool,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

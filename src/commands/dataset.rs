@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::cli::{DatasetCommand, DiffArgs, ExportArgs, FilterArgs, ImportArgs, MergeArgs, SplitArgs};
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::edit::{
-    ChangedEpisode, Condition, Difference, EditSummary, EpisodeName, SplitBy, Unit, diff, filter, merge, split,
+    Carry, ChangedEpisode, Condition, Difference, EditSummary, EpisodeName, SplitBy, Unit, diff, filter, merge, split,
 };
 use crate::dataset::export::{ExportSummary, export};
 use crate::dataset::import::{ImportSummary, import};
@@ -35,9 +35,13 @@ pub(super) fn refuse_within(source: &Path, to: &Path) -> Result<(), UsageError> 
     Ok(())
 }
 
+fn carry(reencode: bool) -> Carry {
+    if reencode { Carry::Reencode } else { Carry::Packets }
+}
+
 fn run_merge(args: &MergeArgs) -> anyhow::Result<CommandOutcome> {
     args.sources.iter().try_for_each(|source| refuse_within(source, &args.to))?;
-    let summary = merge(&args.sources, &args.to)?;
+    let summary = merge(&args.sources, &args.to, carry(args.reencode))?;
     tell(&[(&args.to, &summary)], args.json)
 }
 
@@ -47,7 +51,8 @@ fn run_filter(args: &FilterArgs) -> anyhow::Result<CommandOutcome> {
         families: args.family.clone(),
         programs: args.program.clone(),
         outcomes: args.outcome.clone(),
-        split: args.split,
+        split: args.split.clone(),
+        episodes: args.episodes.clone(),
         min_frames: args.min_frames,
         max_frames: args.max_frames,
     };
@@ -58,7 +63,7 @@ fn run_filter(args: &FilterArgs) -> anyhow::Result<CommandOutcome> {
         .into());
     }
     refuse_within(&args.dataset, &args.to)?;
-    let summary = filter(&args.dataset, &condition, &args.to)?;
+    let summary = filter(&args.dataset, &condition, &args.to, carry(args.reencode))?;
     tell(&[(&args.to, &summary)], args.json)
 }
 
@@ -75,7 +80,7 @@ fn run_split(args: &SplitArgs) -> anyhow::Result<CommandOutcome> {
         },
     };
     refuse_within(&args.dataset, &args.to)?;
-    let parts = split(&args.dataset, &by, &args.to)?;
+    let parts = split(&args.dataset, &by, &args.to, carry(args.reencode))?;
     let parts: Vec<_> = parts.into_iter().map(|(name, summary)| (args.to.join(name), summary)).collect();
     tell(&parts.iter().map(|(path, summary)| (path.as_path(), summary)).collect::<Vec<_>>(), args.json)
 }
@@ -96,7 +101,9 @@ fn tell(written: &[(&Path, &EditSummary)], as_json: bool) -> anyhow::Result<Comm
     let line = |(path, of): &(&Path, &EditSummary)| {
         let left_out = if of.left_out > 0 { format!(", {} left out", of.left_out) } else { String::new() };
         let EditSummary { episodes, frames, calls, tasks, .. } = of;
-        format!("{}: {episodes} episodes{left_out}, {tasks} tasks, {frames} frames, {calls} calls", path.display())
+        // Where there are no program tables, none were counted.
+        let calls = if *calls > 0 { format!(", {calls} calls") } else { String::new() };
+        format!("{}: {episodes} episodes{left_out}, {tasks} tasks, {frames} frames{calls}", path.display())
     };
     output::print(&written.iter().map(line).collect::<Vec<_>>().join("\n"))?;
     Ok(CommandOutcome::Done)
@@ -126,19 +133,25 @@ fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
 
 fn run_import(args: &ImportArgs) -> anyhow::Result<CommandOutcome> {
     refuse_within(&args.dataset, &args.to)?;
-    let written = import(&args.dataset, &args.to)?;
+    let written = import(&args.dataset, args.labels, &args.to)?;
     if args.json {
         output::print_json(&json!({ "path": args.to, "summary": written }))?;
     } else {
-        let ImportSummary { episodes, frames, calls, subtasks, .. } = written;
+        let ImportSummary { episodes, frames, calls, subtasks, cut, .. } = written;
         let text = format!("{episodes} episodes, {frames} frames, {calls} calls of {subtasks} sub-tasks");
         output::print(&format!("{}: {text}", args.to.display()))?;
+        if cut > 0 {
+            output::note(&format!("{cut} labels shared frames with others of their level, or lay behind the end: cut"));
+        }
     }
     Ok(CommandOutcome::Done)
 }
 
 fn diff_text(found: &Difference) -> String {
     let name = |of: &EpisodeName| {
+        if of.recording.is_empty() {
+            return format!("episode {} ({})", of.episode_index, of.task_id);
+        }
         format!("episode {} ({}, {} of {})", of.episode_index, of.task_id, of.recording_index, of.recording)
     };
     let mut lines: Vec<String> = found.settings.iter().map(|line| format!("setting  {line}")).collect();

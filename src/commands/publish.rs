@@ -1,5 +1,6 @@
 //! `ntp publish DATASET --to DIR|URL --license ID --date DAY`.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -38,7 +39,7 @@ pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<
 fn publication(args: &PublishArgs) -> anyhow::Result<Publication> {
     let name = match &args.name {
         Some(name) => name.trim().to_owned(),
-        None => format!("NTP demonstrations: {}", summarize(&args.dataset)?.families.join(", ").replace('_', " ")),
+        None => default_name(&args.dataset)?,
     };
     let texts = args.creator.iter().chain(&args.url).chain([&name]);
     if let Some(text) = texts.into_iter().find(|text| text.is_empty() || text.chars().any(char::is_control)) {
@@ -52,4 +53,17 @@ fn publication(args: &PublishArgs) -> anyhow::Result<Publication> {
         url: args.url.clone(),
         release: args.release,
     })
+}
+
+/// Of a dataset of ours by its families, of others by the folder's name.
+fn default_name(dataset: &Path) -> anyhow::Result<String> {
+    let summary = summarize(dataset)?;
+    if summary.declared.is_none() {
+        return Ok(format!("NTP demonstrations: {}", summary.families.join(", ").replace('_', " ")));
+    }
+    let folder = dataset.canonicalize().unwrap_or_else(|_gone| dataset.to_owned());
+    Ok(folder
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_else(|| "Robot episodes".to_owned()))
 }

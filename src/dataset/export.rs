@@ -25,7 +25,7 @@ use serde::Serialize;
 use crate::artifact::StagedDir;
 use crate::dataset::edit::EditError;
 
-pub(in crate::dataset) use plain::{copy_files, copy_folder, with_columns};
+pub(in crate::dataset) use plain::{copy_folder, with_columns};
 
 /// What labels are written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

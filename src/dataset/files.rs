@@ -7,4 +7,5 @@ pub(crate) mod error;
 pub(crate) mod finding;
 pub(crate) mod info;
 pub(crate) mod layout;
+pub(crate) mod pointer;
 pub(crate) mod rolling;

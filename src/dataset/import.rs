@@ -1,43 +1,47 @@
-//! Someone else's annotated dataset as one of ours: `subtask_index` becomes a program tree of two levels.
+//! Someone else's labelled dataset as one of ours: its labels become a program tree.
 //!
 //! # Input and output
 //!
-//! [`import`] reads a `LeRobotDataset` v3.0 with the column `subtask_index` and `meta/subtasks.parquet`. It writes the
-//! same dataset (columns, videos and statistics as they were) with `ntp.call_id` and `ntp.program` for each frame and
-//! the tables under `ntp/`. The root program `task` runs through each episode; each run of frames of one sub-task is a
-//! call of the sub-task's text. Frames with a negative `subtask_index` are the root's own.
+//! [`import`] reads a `LeRobotDataset` v3.0 with labels in one of the forms of [`LabelsForm`]. It writes the same
+//! dataset (columns, videos and statistics as they were) with `ntp.call_id` and `ntp.program` for each frame and the
+//! tables under `ntp/`. The root program `task` runs through each episode; each label is a call of its text, those of the
+//! second level below those of the first. Frames without a label are the root's own.
 //!
 //! Spans of such a dataset share no frame: a call has the frames that are annotated so. Demonstrations are taken for
 //! successes, as nothing says otherwise. An episode's recording is the file of frames that it was read from, by name
 //! and hash, and a task is named by its text: so imported datasets can be edited and compared as our own are.
 //!
+//! Scoping labels are not written: every call sees the whole episode, so that its span tells them, and rows for each
+//! call and frame would grow with the product of both.
+//!
 //! # Errors
 //!
-//! [`EditError::Refused`] with `import.*` names what the dataset lacks. Memory holds some thousand rows and one
-//! episode's calls.
+//! [`EditError::Refused`] with `import.*` names what the dataset lacks. Memory holds some thousand rows, one episode's
+//! calls, and an entry for each episode.
 
-mod episode;
 mod frames;
+mod meta;
 mod rows;
-mod texts;
 
 use std::path::Path;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::artifact::{IoError, StagedDir, read_json, write_json};
+use crate::artifact::{IoError, StagedDir, write_json};
+use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
-use crate::dataset::files::info::{Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::files::info::{LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout;
-use crate::dataset::tables::annotated::{ANNOTATED_BY, vocabulary};
+use crate::dataset::plain::{DeclaredKind, LabelsForm, PlainInfo, PlainLabels, PlainSource, PlainTexts};
+use crate::dataset::tables::annotated::vocabulary;
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 
 use frames::write_frames;
+use meta::write_meta;
+use rows::AnnotatedRows;
 pub(in crate::dataset) use rows::task_id;
-use rows::{AnnotatedRows, write_meta};
-use texts::{read_subtasks, read_tasks};
 
 /// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -48,89 +52,155 @@ pub struct ImportSummary {
     pub frames: u64,
     /// Program calls, roots included.
     pub calls: u64,
-    /// Scoping labels.
+    /// Scoping labels: none, since the spans of calls tell them.
     pub scopes: u64,
-    /// Sub-tasks that `subtask_index` counts.
+    /// Distinct texts of labels.
     pub subtasks: u64,
+    /// Labels that shared frames with others of their level, or lay behind the end, and were cut.
+    pub cut: u64,
 }
 
-/// Brings in a dataset, as a new folder.
+/// Brings in a dataset, as a new folder. Where `form` is `None`, its labels tell theirs.
 ///
 /// # Errors
 ///
-/// When the dataset is not annotated, or cannot be read, or there is something at `to`.
-pub fn import(root: &Path, to: &Path) -> Result<ImportSummary, EditError> {
-    let info = read_info(root)?;
-    let (tasks, subtasks) = (read_tasks(root)?, read_subtasks(root)?);
+/// When the dataset is not labelled, or cannot be read, or there is something at `to`.
+pub fn import(root: &Path, form: Option<LabelsForm>, to: &Path) -> Result<ImportSummary, EditError> {
+    let info = PlainInfo::read(root).map_err(|error| match error {
+        DatasetError::Count { path, problem } => EditError::refused("import.rows", &path, problem),
+        other => other.into(),
+    })?;
+    check_version(&info)?;
+    let source = PlainSource::open(root)?;
+    let form = check(&source, form)?;
+    let tasks = in_order(&root.join(layout::TASKS), &source.tasks)?;
+    let known = source.subtasks.as_ref().filter(|_| form == LabelsForm::SubtaskIndex);
+    let known = known.map(|known| in_order(&root.join(layout::SUBTASKS), known)).transpose()?;
     let staged = StagedDir::begin(to)?;
     let folder = staged.partial_path();
-    let fps = info["fps"].as_f64().filter(|fps| *fps > 0.0);
-    let fps =
-        fps.ok_or_else(|| EditError::refused("import.rows", &root.join(layout::INFO), "fps is no number above 0"))?;
-    let mut rows = AnnotatedRows::create(folder, &tasks, &subtasks, fps)?;
-    write_frames(root, folder, &subtasks, &mut rows)?;
-    write_meta(root, folder, &tasks, rows.lengths())?;
-    let summary = rows.finish()?;
-    let expected = (info["total_episodes"].as_u64(), info["total_frames"].as_u64());
-    if expected != (Some(summary.episodes), Some(summary.frames)) {
-        let found = (summary.episodes, summary.frames);
-        let problem = format!("it counts {expected:?} episodes and frames, but there are {found:?}");
-        return Err(EditError::refused("import.rows", &root.join(layout::INFO), problem));
+    let mut rows = AnnotatedRows::create(folder, &source)?;
+    let mut labels = PlainLabels::open(form);
+    // Numbers that frames have already stay as they are.
+    known.iter().flatten().for_each(|text| labels.know(text));
+    let places = write_frames(&source, &mut labels, folder, &mut rows)?;
+    write_meta(&source, &places, folder)?;
+    let (summary, texts) = (rows.finish()?, labels.texts().to_vec());
+    let summary = ImportSummary { subtasks: texts.len() as u64, cut: labels.n_cut, ..summary };
+    check_totals(&source, summary)?;
+    write_tasks(folder, &tasks)?;
+    // Numbers that frames have beside labels of another form count texts of their own.
+    let others = source.subtasks.as_ref().filter(|_| form != LabelsForm::SubtaskIndex);
+    match others.filter(|_| source.info.feature("subtask_index").is_some()) {
+        Some(others) => write_subtasks(folder, &others.in_order())?,
+        None => write_subtasks(folder, &texts)?,
     }
-    write_texts(root, folder, &tasks, &subtasks)?;
-    write_infos(root, folder, info, &subtasks, summary)?;
+    let stats = root.join(layout::STATS);
+    if stats.is_file() {
+        std::fs::copy(&stats, folder.join(layout::STATS)).map_err(IoError::system("copy", &stats))?;
+    }
+    write_infos(&source, form, &texts, summary, folder)?;
     copy_folder(&root.join(layout::VIDEOS), &folder.join(layout::VIDEOS))?;
     staged.commit()?;
     Ok(summary)
 }
 
-fn read_info(root: &Path) -> Result<Value, EditError> {
-    let path = root.join(layout::INFO);
-    let info: Value = read_json(&path)?;
-    let refused = |code, problem: String| Err(EditError::refused(code, &path, problem));
-    if info["codebase_version"] != LEROBOT_VERSION {
-        return refused("import.version", format!("codebase_version is {}, not v3.0", info["codebase_version"]));
+fn check_version(info: &PlainInfo) -> Result<(), EditError> {
+    if info.version.name() == LEROBOT_VERSION {
+        return Ok(());
     }
-    if info["features"]["subtask_index"]["dtype"] != "int64" {
-        return refused("import.annotation", "no feature subtask_index of dtype int64 is declared".to_owned());
-    }
-    let is_taken = |name: &&str| !info["features"][*name].is_null();
-    if let Some(name) = ["ntp.call_id", "ntp.program"].iter().find(|name| is_taken(name)) {
-        return refused("import.annotation", format!("it has the feature {name} already"));
-    }
-    Ok(info)
+    let problem = format!(
+        "codebase_version is {:?}, not v3.0; `ntp dataset merge THEIRS --to NEW` makes one of v3.0 of it",
+        info.version.name()
+    );
+    Err(EditError::refused("import.version", &info.root().join(layout::INFO), problem))
 }
 
-fn write_texts(root: &Path, to: &Path, tasks: &[String], subtasks: &[String]) -> Result<(), EditError> {
-    write_tasks(to, tasks)?;
-    write_subtasks(to, subtasks)?;
-    let stats = root.join(layout::STATS);
-    if stats.is_file() {
-        std::fs::copy(&stats, to.join(layout::STATS)).map_err(IoError::system("copy", &stats))?;
+/// The form of the labels, where the dataset can be brought in.
+fn check(source: &PlainSource, form: Option<LabelsForm>) -> Result<LabelsForm, EditError> {
+    let info = &source.info;
+    let path = info.root().join(layout::INFO);
+    let refused = |code, problem: String| Err(EditError::refused(code, &path, problem));
+    if let Some(name) = ["ntp.call_id", "ntp.program"].iter().find(|name| info.feature(name).is_some()) {
+        return refused("import.annotation", format!("it has the feature {name} already"));
+    }
+    let forms = source.label_forms();
+    let Some(form) = form.or_else(|| LabelsForm::of(source)) else {
+        let problem = "it has no labels: neither a feature subtask_index or language_persistent, nor SARM's columns, nor \
+                       BEHAVIOR-1K's annotations";
+        return refused("import.annotation", problem.to_owned());
+    };
+    if !forms.contains(&form.name()) {
+        let there = if forms.is_empty() { "none".to_owned() } else { forms.join(", ") };
+        return refused("import.annotation", format!("it has no labels of the form {}; it has {there}", form.name()));
+    }
+    let is_whole = |of: &crate::dataset::plain::Declared| matches!(of.kind, DeclaredKind::Numbers(_));
+    if form == LabelsForm::SubtaskIndex && !info.feature("subtask_index").is_some_and(is_whole) {
+        return refused("import.annotation", "no feature subtask_index of dtype int64 is declared".to_owned());
+    }
+    match info.problems.iter().find(|problem| problem.code == "info.features") {
+        Some(of) => refused("import.features", format!("{}: {}", of.place, of.message)),
+        None => Ok(form),
+    }
+}
+
+/// Texts in the order of their numbers, which must be 0, 1 and so on.
+fn in_order(path: &Path, texts: &PlainTexts) -> Result<Vec<String>, EditError> {
+    let in_order = texts.in_order();
+    if in_order.len() == texts.rows.len() {
+        return Ok(in_order);
+    }
+    let problem = format!("its numbers are not 0 to {}: there is no {}", texts.rows.len() - 1, in_order.len());
+    Err(EditError::refused("import.texts", path, problem))
+}
+
+fn check_totals(source: &PlainSource, summary: ImportSummary) -> Result<(), EditError> {
+    let info = &source.info;
+    let expected = (info.total("total_episodes"), info.total("total_frames"));
+    let found = (summary.episodes, summary.frames);
+    if expected.0.is_some_and(|n| n != found.0) || expected.1.is_some_and(|n| n != found.1) {
+        let problem = format!("it counts {expected:?} episodes and frames, but there are {found:?}");
+        return Err(EditError::refused("import.rows", &info.root().join(layout::INFO), problem));
     }
     Ok(())
 }
 
 fn write_infos(
-    root: &Path,
-    to: &Path,
-    mut info: Value,
-    subtasks: &[String],
+    source: &PlainSource,
+    form: LabelsForm,
+    texts: &[String],
     summary: ImportSummary,
+    to: &Path,
 ) -> Result<(), EditError> {
-    if info["robot_type"].is_null() {
-        info["robot_type"] = json!("unknown");
+    let mut info: Value = source.info.json.clone();
+    let number = json!({ "dtype": "int64", "shape": [1], "names": null });
+    info["features"]["ntp.call_id"] = number.clone();
+    info["features"]["ntp.program"] = json!({ "dtype": "string", "shape": [1], "names": null });
+    if source.info.feature("subtask_index").is_none() {
+        info["features"]["subtask_index"] = number;
     }
     if info["video_path"].is_null() {
         info["video_path"] = json!("videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4");
     }
-    info["features"]["ntp.call_id"] = json!({ "dtype": "int64", "shape": [1], "names": null });
-    info["features"]["ntp.program"] = json!({ "dtype": "string", "shape": [1], "names": null });
-    if let Err(error) = serde_json::from_value::<Info>(info.clone()) {
-        return Err(EditError::refused("import.features", &root.join(layout::INFO), error.to_string()));
+    if info["robot_type"].is_null() {
+        info["robot_type"] = json!("unknown");
     }
+    // What others may leave out, and readers of ours take from there.
+    let totals = [
+        ("total_episodes", summary.episodes),
+        ("total_frames", summary.frames),
+        ("total_tasks", source.tasks.rows.len() as u64),
+        ("chunks_size", 1000),
+        ("data_files_size_in_mb", 100),
+        ("video_files_size_in_mb", 200),
+    ];
+    for (key, usual) in totals {
+        if info[key].is_null() {
+            info[key] = json!(usual);
+        }
+    }
+    info["data_path"] = json!("data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet");
     write_json(&to.join(layout::INFO), &info)?;
-    let (vocabulary, vocabulary_hash) = vocabulary(subtasks);
+    let (vocabulary, vocabulary_hash) = vocabulary(texts);
     let ntp = NtpInfo {
         schema_version: NTP_VERSION,
         ntp_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -143,7 +213,7 @@ fn write_infos(
         total_calls: summary.calls,
         total_scopes: summary.scopes,
         failed_left_out: 0,
-        annotated_by: Some(ANNOTATED_BY.to_owned()),
+        annotated_by: Some(form.name().to_owned()),
     };
     Ok(write_json(&to.join(layout::NTP_INFO), &ntp)?)
 }

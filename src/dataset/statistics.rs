@@ -173,6 +173,15 @@ impl Statistics {
         }
     }
 
+    /// Adds some rows of an episode that comes in parts.
+    pub(crate) fn append_part(&mut self, columns: &[(&str, Values<'_>)], rows: &Range<usize>) {
+        for (gathered, (_, column)) in self.features.iter_mut().zip(columns) {
+            copy_values(*column, rows.clone(), &mut self.values);
+            gathered.episode.measure(&self.values);
+            gathered.whole.merge(&gathered.episode);
+        }
+    }
+
     /// Keeps the first rows of the features' columns for the quantiles of the whole.
     pub(crate) fn keep(&mut self, columns: &[(&str, Values<'_>)], n_rows: usize) -> Result<(), IoError> {
         for begin in (0..n_rows).step_by(BLOCK_ROWS) {

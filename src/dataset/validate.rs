@@ -7,8 +7,11 @@ mod annotated;
 mod by_model;
 mod meta;
 mod pictures;
+mod plain;
 
 use std::path::Path;
+
+pub(crate) use plain::episode::episode_problem;
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
@@ -16,6 +19,7 @@ use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::info::{Info, NtpInfo};
 use crate::dataset::files::layout;
+use crate::dataset::plain::{ProgramTables, program_tables};
 use crate::dataset::tables::calls::check::{ArgumentBatch, check_arguments, check_tree};
 use crate::dataset::tables::calls::read::{CallBatch, read_calls};
 use crate::dataset::tables::episodes::check::EpisodeCheck;
@@ -31,12 +35,22 @@ use crate::trace::ProgramCall;
 ///
 /// Holds the counts and the order of all rows, the rules of the program tree, labels against spans, actions against
 /// positions, task texts, the declared features, the presence and range of statistics, and that no task is in two
-/// splits. It reads no recordings.
+/// splits. It reads no recordings. A dataset without program tables is held against the rules of `LeRobot`'s format
+/// alone, one that was annotated elsewhere also against those of its program tree.
 pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
+    let tables = program_tables(root);
+    if tables != ProgramTables::Own {
+        plain::check(root, &mut validation);
+        meta::check_card(root, &mut validation);
+    }
+    if tables == ProgramTables::None {
+        return validation;
+    }
     // One that cannot be read is found below.
     let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
     if let Some(info) = info.ok().filter(|info| info.annotated_by.is_some()) {
+        validation = Validation { episodes: 0, frames: 0, ..validation };
         let texts = read_all_texts(root, &mut validation);
         let check = if info.has_our_programs() { by_model::check } else { annotated::check };
         if let Err(error) = check(root, &texts, &mut validation) {
@@ -95,7 +109,7 @@ impl EpisodeChecks {
             arguments: Some(Cursor::new(root, layout::CALLS)),
             scopes: Some(Cursor::new(root, layout::SCOPES)),
         };
-        let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.fps, action_of(info)));
+        let (episodes, frames) = (EpisodeCheck::default(), FrameCheck::new(n_slots, info.whole_fps(), action_of(info)));
         Ok(Self { n_slots, texts, tables, episodes, frames, calls: Vec::new() })
     }
 

@@ -32,14 +32,17 @@ pub(super) fn render(facts: &Facts, publication: &Publication, files: &[FileEntr
         "keywords": facts.tags,
         "citeAs": facts.cite_as,
         "isLiveDataset": false,
-        "prov:wasGeneratedBy": {
-            "@type": "prov:Activity",
-            "name": facts.command,
-            "description": format!("ntp {}", facts.summary.ntp_version),
-        },
         "distribution": distribution(facts, files),
         "recordSet": facts.tables.iter().map(record_set).chain([splits(facts)]).collect::<Vec<_>>(),
     });
+    // Of a dataset that was written elsewhere nothing tells what made it.
+    if let Some(version) = &facts.summary.ntp_version {
+        document["prov:wasGeneratedBy"] = json!({
+            "@type": "prov:Activity",
+            "name": facts.command,
+            "description": format!("ntp {version}"),
+        });
+    }
     if let Some(url) = &publication.url {
         document["url"] = json!(url);
     }
@@ -133,14 +136,18 @@ fn field(table: &TableFacts, column: &ColumnFacts) -> Option<Value> {
 
 /// The splits, as Croissant wants them: a small record set of its own.
 fn splits(facts: &Facts) -> Value {
-    let url = |split: &str| if split == "seen" { "cr:TrainingSplit" } else { "cr:TestSplit" };
+    let url = |split: &str| match split {
+        "seen" | "train" => "cr:TrainingSplit",
+        "val" | "validation" | "dev" => "cr:ValidationSplit",
+        _ => "cr:TestSplit",
+    };
     let rows: Vec<Value> =
         facts.summary.splits.keys().map(|split| json!({ "splits/name": split, "splits/url": url(split) })).collect();
     json!({
         "@type": "cr:RecordSet",
         "@id": "splits",
         "name": "splits",
-        "description": "Values of the column `split` of `episodes`.",
+        "description": if facts.summary.declared.is_some() { "The splits of `meta/info.json`." } else { "Values of the column `split` of `episodes`." },
         "dataType": "cr:Split",
         "key": { "@id": "splits/name" },
         "field": [

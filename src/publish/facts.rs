@@ -71,9 +71,9 @@ impl Facts {
         let summary = summarize(dataset)?;
         let provenance = Provenance::of(dataset)?;
         let pipeline = provenance.pipeline(&publication.slug());
-        let origin = Origin::of(dataset)?;
+        let origin = Origin::of(dataset, &summary)?;
         let creators = creators(&origin, publication);
-        let cite_as = citation(publication, &creators);
+        let cite_as = citation(publication, &creators, summary.declared.is_none());
         let left_out = match pipeline {
             Some(_) => Vec::new(),
             // Its own plan tells of each of them how it was made.
@@ -96,7 +96,7 @@ impl Facts {
             command: provenance.command().unwrap_or_else(|| origin.command().to_owned()),
             sources: provenance.sources(),
             import_sha256: provenance.import_sha256().map(ToOwned::to_owned),
-            bibtex: format!("{cite_as}\n{PAPER}"),
+            bibtex: if summary.declared.is_some() { cite_as.clone() } else { format!("{cite_as}\n{PAPER}") },
             cite_as,
             provenance_files: provenance_files(&provenance, pipeline.as_deref()),
             pipeline,
@@ -132,10 +132,11 @@ fn creators(origin: &Origin, publication: &Publication) -> Vec<String> {
 }
 
 /// How the dataset itself is cited.
-fn citation(publication: &Publication, creators: &[String]) -> String {
+fn citation(publication: &Publication, creators: &[String], is_ours: bool) -> String {
     let url = publication.url.as_ref().map(|url| format!("\n  url     = {{{url}}},")).unwrap_or_default();
+    let made = if is_ours { "made" } else { "checked and published" };
     format!(
-        "@misc{{{},\n  title   = {{{}}},\n  author  = {{{}}},\n  year    = {{{}}},{url}\n  note    = {{Release {}, made \
+        "@misc{{{},\n  title   = {{{}}},\n  author  = {{{}}},\n  year    = {{{}}},{url}\n  note    = {{Release {}, {made} \
          with ntp {}: Neural Task Programming as a dataset pipeline}}\n}}\n",
         publication.slug(),
         publication.name,

@@ -10,7 +10,7 @@ use crate::publish::destination::{Creation, Destination};
 use crate::publish::folder::files_below;
 
 /// Folders of a dataset that has no manifest.
-const FOLDERS: [&str; 4] = ["data", "meta", "ntp", "videos"];
+const FOLDERS: [&str; 5] = ["annotations", "data", "meta", "ntp", "videos"];
 /// The contract's own files, which make the published folder the same artifact.
 const CONTRACT: [&str; 2] = ["plan.json", "manifest.json"];
 
@@ -26,7 +26,10 @@ pub(super) fn of_dataset(dataset: &Path) -> Result<Vec<FileEntry>, PublishError>
     let dir = StageDir::new(Stage::Convert.name(), dataset);
     let Some(manifest) = dir.manifest()? else {
         let below = files_below(dataset)?;
-        let is_part = |path: &String| path.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+        // What systems and editors leave behind has names that begin with a dot.
+        let is_litter = |path: &str| path.split('/').any(|part| part.starts_with('.'));
+        let is_in_folder = |path: &str| path.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+        let is_part = |path: &String| is_in_folder(path) && !is_litter(path);
         let entries = below.iter().filter(|path| is_part(path)).map(|path| FileEntry::of(dataset, path));
         return Ok(entries.collect::<Result<_, _>>()?);
     };

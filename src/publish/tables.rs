@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::dataset::{DatasetSummary, schema, table_files};
+use crate::dataset::{DatasetSummary, TableFiles, schema, table_files};
 use crate::publish::PublishError;
 use crate::table::{ColumnKind, file_columns};
 
@@ -20,6 +20,12 @@ const SUBSETS: [(&str, &str, &str, &[&str]); 4] = [
         "a call and a frame of its caller's window",
         &["episode_index", "call_id", "specification_frame"],
     ),
+];
+
+/// Those of a dataset without program tables.
+const PLAIN_SUBSETS: [(&str, &str, &str, &[&str]); 2] = [
+    ("frames", "data/*/*.parquet", "a frame", &["index"]),
+    ("episodes", "meta/episodes/*/*.parquet", "an episode", &["episode_index"]),
 ];
 
 /// A column of a table.
@@ -51,10 +57,15 @@ pub(super) fn tables(root: &Path, summary: &DatasetSummary) -> Result<Vec<TableF
     let files = table_files(root)?;
     let schemas = schema::ALL;
     let mut tables = Vec::new();
-    for (name, pattern, row, key) in SUBSETS {
-        let first = files.iter().find(|(table, _)| *table == name).and_then(|(_, files)| files.first());
+    let subsets: &[_] = if summary.declared.is_some() { &PLAIN_SUBSETS } else { &SUBSETS };
+    for &(name, pattern, row, key) in subsets {
+        let first = files.iter().find_map(|(table, files)| match files {
+            TableFiles::Parquet(files) if *table == name => files.first(),
+            _ => None,
+        });
         let Some(first) = first else { continue };
-        let meaning = |column: &str| schemas.iter().find(|schema| schema.name() == name)?.meaning(column);
+        let known = if summary.declared.is_some() && name == "episodes" { "meta_episodes" } else { name };
+        let meaning = |column: &str| schemas.iter().find(|schema| schema.name() == known)?.meaning(column);
         let facts = |(column, kind): (String, _)| facts(meaning(&column), column, kind);
         let columns = file_columns(first)?.into_iter().map(facts).collect();
         let rows = match name {

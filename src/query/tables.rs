@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{
-    Column, DataFrame, DataType, IntoLazy as _, LazyFrame, PlRefPath, PolarsError, ScanArgsParquet, SchemaRef,
-    UnionArgs, col, concat, lit,
+    Column, DataFrame, DataType, IntoLazy as _, LazyFrame, NamedFrom as _, PlRefPath, PolarsError, ScanArgsParquet,
+    SchemaRef, Series, UnionArgs, col, concat, lit,
 };
 use serde::Serialize;
 
 use crate::dataset;
 use crate::query::{Answer, QueryError};
-use crate::table::column_types;
+use crate::table::{self, column_types};
 
 /// The table whose columns have become more.
 const ROLLOUTS: &str = "rollouts";
@@ -25,6 +25,8 @@ pub struct Tables(BTreeMap<&'static str, Vec<Source>>);
 struct Source {
     path: PathBuf,
     model: Option<String>,
+    /// What was read of a file that is no Parquet.
+    rows: Option<DataFrame>,
 }
 
 /// What a table holds.
@@ -46,7 +48,13 @@ impl Tables {
     /// When a file is missing or has another number of rows than the dataset counts.
     pub fn add_dataset(&mut self, root: &Path) -> Result<(), QueryError> {
         for (name, files) in dataset::table_files(root)? {
-            files.into_iter().for_each(|path| self.add(name, path, None));
+            match files {
+                dataset::TableFiles::Parquet(files) => files.into_iter().for_each(|path| self.add(name, path, None)),
+                dataset::TableFiles::Columns(path, columns) => {
+                    let rows = Some(frame_of(&path, columns)?);
+                    self.0.entry(name).or_default().push(Source { path, model: None, rows });
+                }
+            }
         }
         Ok(())
     }
@@ -72,7 +80,7 @@ impl Tables {
     }
 
     fn add(&mut self, name: &'static str, path: PathBuf, model: Option<String>) {
-        self.0.entry(name).or_default().push(Source { path, model });
+        self.0.entry(name).or_default().push(Source { path, model, rows: None });
     }
 
     /// The tables that there are.
@@ -132,7 +140,7 @@ const UNREAD: [&str; 3] = ["float16", "uint8", "uint16"];
 
 /// Why a table cannot be read, judged by its first file.
 fn unreadable(sources: &[Source]) -> Result<Option<QueryError>, QueryError> {
-    let Some(Source { path, .. }) = sources.first() else { return Ok(None) };
+    let Some(Source { path, rows: None, .. }) = sources.first() else { return Ok(None) };
     let columns = column_types(path)?;
     let found = columns.into_iter().find_map(|(column, types)| {
         let kind = types.into_iter().find(|kind| UNREAD.contains(&kind.as_str()))?;
@@ -160,6 +168,22 @@ fn refused(sources: &[Source], source: PolarsError) -> QueryError {
     QueryError::Table { path: sources.first().map_or_else(PathBuf::new, |source| source.path.clone()), source }
 }
 
+/// Columns that were read already.
+fn frame_of(path: &Path, columns: Vec<(&'static str, table::Column)>) -> Result<DataFrame, QueryError> {
+    let column = |(name, values): (&'static str, table::Column)| match values {
+        table::Column::Int64(values) => Some(Column::new(name.into(), values)),
+        table::Column::Float64(values) => Some(Column::new(name.into(), values)),
+        table::Column::Text(values) => Some(Column::new(name.into(), values)),
+        table::Column::TextList(rows) => {
+            let rows: Vec<Series> = rows.into_iter().map(|row| Series::new("".into(), row)).collect();
+            Some(Column::new(name.into(), rows))
+        }
+        _ => None,
+    };
+    let rows = DataFrame::new_infer_height(columns.into_iter().filter_map(column).collect());
+    rows.map_err(|source| QueryError::Table { path: path.to_owned(), source })
+}
+
 /// The files of a table of this name as one.
 fn frame(name: &str, sources: &[Source]) -> Result<LazyFrame, QueryError> {
     match name {
@@ -180,6 +204,9 @@ fn with_lists(mut frame: LazyFrame, sources: &[Source]) -> Result<LazyFrame, Que
 /// The files of a table as one. Where they do not say which model they are of, they are read at once: learning curves
 /// are short, and Polars cannot count the rows of a union of lazy frames without its 128-bit numbers.
 fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
+    if let [Source { rows: Some(rows), .. }] = sources {
+        return Ok(rows.clone().lazy());
+    }
     let unreadable = |source| refused(sources, source);
     if sources.iter().all(|source| source.model.is_none()) {
         return scan(sources.iter().map(|source| source.path.as_path())).map_err(unreadable);

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::{Schema, SchemaRef};
-use parquet::arrow::ArrowSchemaConverter;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::arrow_writer::{ArrowWriter, ArrowWriterOptions};
+use parquet::arrow::{ArrowSchemaConverter, ProjectionMask};
 
 use crate::artifact::{AtomicFile, IoError};
 use crate::table::guard::guarded;
@@ -23,6 +23,8 @@ type FileReaderBuilder = ParquetRecordBatchReaderBuilder<File>;
 pub(crate) struct BatchReader {
     path: PathBuf,
     schema: SchemaRef,
+    n_rows: u64,
+    metadata: Vec<(String, String)>,
     reader: ParquetRecordBatchReader,
 }
 
@@ -30,6 +32,25 @@ impl BatchReader {
     /// Opens a file, to be read in batches of so many rows.
     pub(crate) fn open(path: &Path, batch_rows: usize) -> Result<Self, TableError> {
         Self::open_with(path, |builder| builder.with_batch_size(batch_rows))
+    }
+
+    /// Opens the columns of a file that are wanted, to be read in batches of so many rows.
+    pub(crate) fn open_columns(
+        path: &Path,
+        batch_rows: usize,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Result<Self, TableError> {
+        Self::open_with(path, |builder| projected(builder, is_wanted).with_batch_size(batch_rows))
+    }
+
+    /// Opens the same from a row on.
+    pub(crate) fn open_from(
+        path: &Path,
+        first: usize,
+        batch_rows: usize,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Result<Self, TableError> {
+        Self::open_with(path, |builder| projected(builder, is_wanted).with_offset(first).with_batch_size(batch_rows))
     }
 
     /// Opens some rows of a file, to be read as one batch or several.
@@ -45,8 +66,12 @@ impl BatchReader {
             let file = File::open(path).map_err(IoError::system("open", path))?;
             let builder = FileReaderBuilder::try_new(file).map_err(TableError::parquet(path))?;
             let schema = Arc::clone(builder.schema());
+            let footer = builder.metadata().file_metadata();
+            let n_rows = footer.num_rows().max(0) as u64;
+            let entries = footer.key_value_metadata().into_iter().flatten();
+            let metadata = entries.filter_map(|entry| Some((entry.key.clone(), entry.value.clone()?))).collect();
             let reader = settings(builder).build().map_err(TableError::parquet(path))?;
-            Ok(Self { path: path.to_owned(), schema, reader })
+            Ok(Self { path: path.to_owned(), schema, n_rows, metadata, reader })
         })
     }
 
@@ -55,11 +80,29 @@ impl BatchReader {
         &self.schema
     }
 
+    /// Rows of the file, as its footer says.
+    pub(crate) fn n_rows(&self) -> u64 {
+        self.n_rows
+    }
+
+    /// An entry of the file's key-value metadata.
+    pub(crate) fn metadata(&self, key: &str) -> Option<&str> {
+        self.metadata.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
+    }
+
     /// The next rows; `None` at the end.
     pub(crate) fn next_batch(&mut self) -> Result<Option<RecordBatch>, TableError> {
         let (path, reader) = (&self.path, &mut self.reader);
         guarded(path, || reader.next().transpose().map_err(TableError::arrow(path)))
     }
+}
+
+/// Leaves out the columns that are not wanted.
+fn projected(builder: FileReaderBuilder, is_wanted: impl Fn(&str) -> bool) -> FileReaderBuilder {
+    let fields = builder.schema().fields().iter().enumerate();
+    let roots: Vec<usize> = fields.filter(|(_, field)| is_wanted(field.name())).map(|(at, _)| at).collect();
+    let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
+    builder.with_projection(mask)
 }
 
 /// Writes batches, each a row group. Dropped without [`BatchWriter::commit`] it leaves nothing.

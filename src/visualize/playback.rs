@@ -106,9 +106,14 @@ fn markdown(playback: &Playback) -> String {
     let facts = &playback.facts;
     let (n_frames, n_calls) = (playback.times_secs.len(), facts.calls.len());
     let duration = playback.times_secs.last().copied().unwrap_or(0.0);
+    let episode = facts.episode_index;
+    if facts.outcome.is_empty() {
+        let split = if facts.split.is_empty() { String::new() } else { format!("split `{}`, ", facts.split) };
+        return format!("# {}\n\n{split}episode {episode}: {n_frames} frames, {duration:.1} s\n", facts.task_text);
+    }
     format!(
-        "# {}\n\n{}\n\n**{}**, by `{}`, `{}` task\n\nepisode {}: {n_frames} frames, {n_calls} calls, {duration:.1} s\n",
-        facts.task_id, facts.task_text, facts.outcome, facts.actor, facts.split, facts.episode_index
+        "# {}\n\n{}\n\n**{}**, by `{}`, `{}` task\n\nepisode {episode}: {n_frames} frames, {n_calls} calls, {duration:.1} s\n",
+        facts.task_id, facts.task_text, facts.outcome, facts.actor, facts.split
     )
 }
 

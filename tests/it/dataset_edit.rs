@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, AsArray as _, BinaryArray, RecordBatch, StringArray, StructArray};
 use arrow::datatypes::{DataType, Field, Int64Type};
-use ntp::dataset::edit::{Condition, EditError, Ending, SplitBy, Unit, diff, filter, merge, split};
+use ntp::dataset::edit::{Carry, Condition, EditError, Ending, SplitBy, Unit, diff, filter, merge, split};
 use ntp::dataset::{
     ConvertConfig, FailedEpisodes, FrameChoice, RecordingEpisodes, convert, read_trials, schema, validate,
 };
@@ -106,7 +106,7 @@ fn merging_gives_what_converting_all_at_once_would() {
     let episodes = episodes();
     dataset(&whole, &[(0, &episodes[..4]), (1, &episodes[4..])], &ConvertConfig::default());
     let merged = folder.path().join("merged");
-    let summary = merge(&sources(folder.path()), &merged).unwrap();
+    let summary = merge(&sources(folder.path()), &merged, Carry::Packets).unwrap();
     assert_eq!((summary.episodes, summary.left_out, summary.tasks), (6, 0, 3));
     assert_same_content(&merged, &whole);
     assert_eq!(validate(&merged).findings, []);
@@ -124,7 +124,7 @@ fn merging_keeps_frames_between_boundaries_and_both_kinds_of_slot_names() {
     dataset(&folder.path().join("b"), &[(1, &sorted)], &config);
     dataset(&folder.path().join("whole"), &[(0, &towers), (1, &sorted)], &config);
     let merged = folder.path().join("merged");
-    merge(&sources(folder.path()), &merged).unwrap();
+    merge(&sources(folder.path()), &merged, Carry::Packets).unwrap();
     assert_same_content(&merged, &folder.path().join("whole"));
     assert_eq!(validate(&merged).findings, []);
     assert_opens_in_rerun(&merged, &lengths(&merged));
@@ -134,8 +134,8 @@ fn merging_keeps_frames_between_boundaries_and_both_kinds_of_slot_names() {
 fn merging_is_the_same_bytes_each_time_and_says_where_episodes_come_from() {
     let folder = two_datasets();
     let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
-    let summary = merge(&sources(folder.path()), &first).unwrap();
-    assert_eq!(merge(&sources(folder.path()), &second).unwrap(), summary);
+    let summary = merge(&sources(folder.path()), &first, Carry::Packets).unwrap();
+    assert_eq!(merge(&sources(folder.path()), &second, Carry::Packets).unwrap(), summary);
     for file in summary.files.iter().map(String::as_str).chain(["plan.json", "manifest.json"]) {
         let [a, b] = [&first, &second].map(|root| std::fs::read(root.join(file)).unwrap());
         assert!(a == b, "{file} differs");
@@ -159,7 +159,7 @@ fn filtering_gives_what_converting_the_wanted_episodes_would() {
     dataset(&root, &[(0, &all)], &config);
     let cases: [(&str, Condition, &[usize]); 8] = [
         ("task", Condition { tasks: vec!["stack_1".into()], ..Condition::default() }, &[2, 3]),
-        ("split", Condition { split: Some(Split::Seen), ..Condition::default() }, &[0, 1]),
+        ("split", Condition { split: Some(Split::Seen.name().to_owned()), ..Condition::default() }, &[0, 1]),
         ("success", Condition { outcomes: vec![Ending::Success], ..Condition::default() }, &[0, 1, 3, 4, 5]),
         ("cause", Condition { outcomes: vec![Ending::Cause(Cause::MissedGrasp)], ..Condition::default() }, &[2]),
         ("short", Condition { max_frames: Some(5), ..Condition::default() }, &[2, 3]),
@@ -171,13 +171,17 @@ fn filtering_gives_what_converting_the_wanted_episodes_would() {
         ),
         (
             "both",
-            Condition { outcomes: vec![Ending::Failure], split: Some(Split::Unseen), ..Condition::default() },
+            Condition {
+                outcomes: vec![Ending::Failure],
+                split: Some(Split::Unseen.name().to_owned()),
+                ..Condition::default()
+            },
             &[2],
         ),
     ];
     for (name, condition, wanted) in cases {
         let found = folder.path().join(name);
-        let summary = filter(&root, &condition, &found).unwrap();
+        let summary = filter(&root, &condition, &found, Carry::Packets).unwrap();
         assert_eq!(summary.left_out as usize, 6 - wanted.len(), "{name}");
         assert_eq!(validate(&found).findings, [], "{name}");
         let expected = tempfile::tempdir().unwrap();
@@ -191,7 +195,7 @@ fn filtering_gives_what_converting_the_wanted_episodes_would() {
         assert_eq!(stats(&found)["index"], stats(expected.path())["index"], "{name}");
     }
     let none = Condition { programs: vec![Program::ObjectSorting.name().to_owned()], ..Condition::default() };
-    refused(filter(&root, &none, &folder.path().join("none")), "edit.empty", "no episode is left");
+    refused(filter(&root, &none, &folder.path().join("none"), Carry::Packets), "edit.empty", "no episode is left");
     assert!(!folder.path().join("none").exists() && !folder.path().join(".partial-none").exists());
 }
 
@@ -204,7 +208,7 @@ fn what_does_not_fit_together_is_refused_by_name() {
     let check = |make: &dyn Fn(&Path), code: &str, words: &str| {
         let _none = std::fs::remove_dir_all(&other);
         make(&other);
-        refused(merge(&[a.clone(), other.clone()], &to), code, words);
+        refused(merge(&[a.clone(), other.clone()], &to, Carry::Packets), code, words);
         assert!(!to.exists());
     };
     let with = |config: ConvertConfig| move |root: &Path| dataset(root, &[(1, &episodes()[4..])], &config);
@@ -241,8 +245,8 @@ fn what_does_not_fit_together_is_refused_by_name() {
         "edit.columns",
         "observation.picture",
     );
-    refused(merge(&[a.clone(), a], &to), "edit.episode", "is there twice");
-    refused(merge(&[], &to), "edit.empty", "no dataset");
+    refused(merge(&[a.clone(), a], &to, Carry::Packets), "edit.episode", "is there twice");
+    refused(merge(&[], &to, Carry::Packets), "edit.empty", "no dataset");
 }
 
 #[test]
@@ -250,13 +254,13 @@ fn only_a_new_folder_is_written_and_what_a_killed_process_left_is_removed() {
     let folder = two_datasets();
     let to = folder.path().join("to");
     std::fs::create_dir_all(to.join("mine")).unwrap();
-    let error = merge(&sources(folder.path()), &to).unwrap_err();
+    let error = merge(&sources(folder.path()), &to, Carry::Packets).unwrap_err();
     assert!(matches!(error, EditError::Staging(_)) && error.to_string().contains("new or empty folder"), "{error}");
     std::fs::remove_dir(to.join("mine")).unwrap();
     let partial = folder.path().join(".partial-to");
     std::fs::create_dir_all(partial.join("data")).unwrap();
     std::fs::write(partial.join("data/file"), "half").unwrap();
-    merge(&sources(folder.path()), &to).unwrap();
+    merge(&sources(folder.path()), &to, Carry::Packets).unwrap();
     assert!(!partial.exists() && !to.join("data/file").exists() && !to.join(".lock").exists());
     assert_eq!(validate(&to).findings, []);
 }
@@ -293,8 +297,9 @@ fn columns_that_only_others_know_are_carried_over() {
         add_pictures(&root);
     }
     let (merged, filtered) = (folder.path().join("merged"), folder.path().join("filtered"));
-    merge(&sources(folder.path()), &merged).unwrap();
-    filter(&merged, &Condition { tasks: vec!["stack_2".into()], ..Condition::default() }, &filtered).unwrap();
+    merge(&sources(folder.path()), &merged, Carry::Packets).unwrap();
+    filter(&merged, &Condition { tasks: vec!["stack_2".into()], ..Condition::default() }, &filtered, Carry::Packets)
+        .unwrap();
     let file = std::fs::File::open(filtered.join(TABLES[0].0)).unwrap();
     let rows = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap().next().unwrap().unwrap();
     let pictures = rows.column_by_name("observation.picture").unwrap().as_struct().column(0).as_binary::<i32>().clone();
@@ -317,22 +322,22 @@ fn parts_hold_every_episode_once_and_tasks_stay_together() {
         rows.text("task_id").unwrap().into_iter().collect()
     };
     let by_split = folder.path().join("by_split");
-    let parts = split(&root, &SplitBy::Split, &by_split).unwrap();
+    let parts = split(&root, &SplitBy::Split, &by_split, Carry::Packets).unwrap();
     let counts: Vec<_> = parts.iter().map(|(name, summary)| (name.as_str(), summary.episodes)).collect();
     assert_eq!(counts, [("seen", 2), ("unseen", 4)]);
     assert_eq!(tasks(&by_split.join("seen")), BTreeSet::from(["stack_0".to_owned()]));
     let shares = |unit, seed| SplitBy::Shares { parts: vec![("train".into(), 0.67), ("val".into(), 0.33)], unit, seed };
     let drawn = folder.path().join("drawn");
-    let parts = split(&root, &shares(Unit::Task, 3), &drawn).unwrap();
+    let parts = split(&root, &shares(Unit::Task, 3), &drawn, Carry::Packets).unwrap();
     assert_eq!(parts.iter().map(|(_, summary)| summary.episodes).collect::<Vec<_>>(), [4, 2]);
     assert!(tasks(&drawn.join("train")).is_disjoint(&tasks(&drawn.join("val"))));
     let together = folder.path().join("together");
-    merge(&[drawn.join("train"), drawn.join("val")], &together).unwrap();
+    merge(&[drawn.join("train"), drawn.join("val")], &together, Carry::Packets).unwrap();
     let difference = diff(&root, &together).unwrap();
     assert!(difference.is_none(), "{difference:?}");
     let of_seed = |name: &str, seed| {
         let to = folder.path().join(name);
-        split(&root, &shares(Unit::Episode, seed), &to).unwrap();
+        split(&root, &shares(Unit::Episode, seed), &to, Carry::Packets).unwrap();
         lengths(&to.join("val"))
     };
     assert_eq!(of_seed("x", 1), of_seed("y", 1));
@@ -344,7 +349,12 @@ fn parts_hold_every_episode_once_and_tasks_stay_together() {
     }
     let unfit = |parts: &[(&str, f64)]| {
         let parts = parts.iter().map(|&(name, share)| (name.to_owned(), share)).collect();
-        split(&root, &SplitBy::Shares { parts, unit: Unit::Task, seed: 0 }, &folder.path().join("unfit"))
+        split(
+            &root,
+            &SplitBy::Shares { parts, unit: Unit::Task, seed: 0 },
+            &folder.path().join("unfit"),
+            Carry::Packets,
+        )
     };
     refused(unfit(&[("a", 0.5), ("b", 0.4)]), "edit.parts", "the shares sum to 0.9");
     refused(unfit(&[("a", 0.99), ("b", 0.01)]), "edit.parts", "part \"b\"");
@@ -361,7 +371,7 @@ fn a_difference_names_episodes_calls_and_labels() {
     assert_eq!((disjoint.same, disjoint.removed, disjoint.added), (0, 4, 2));
     assert_eq!(disjoint.added_episodes[1].task_id, "stack_2");
     let moved = folder.path().join("moved");
-    merge(&[b, a.clone()], &moved).unwrap();
+    merge(&[b, a.clone()], &moved, Carry::Packets).unwrap();
     let found = diff(&a, &moved).unwrap();
     assert_eq!((found.same, found.moved, found.added, found.changed), (4, 4, 2, 0));
     let spoilt = folder.path().join("spoilt");
@@ -422,7 +432,7 @@ fn validate_finds_a_changed_byte(root: &Path, file: &str, [byte, other]: [&str; 
 fn validate_finds_a_changed_byte_in_plan_and_receipts() {
     let folder = two_datasets();
     let merged = folder.path().join("merged");
-    merge(&sources(folder.path()), &merged).unwrap();
+    merge(&sources(folder.path()), &merged, Carry::Packets).unwrap();
     let (code, stdout, stderr) = crate::pipeline::run(&["validate", &merged.to_string_lossy()]);
     assert_eq!(code, 0, "{stdout}{stderr}");
     validate_finds_a_changed_byte(&merged, "plan.json", ["\"shards\": 1", "\"shards\": 2"], "plan.json: its id");

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ntp::dataset::edit::{Condition, SplitBy, diff, filter, merge, repair, split};
+use ntp::dataset::edit::{Carry, Condition, SplitBy, diff, filter, merge, repair, split};
 use ntp::dataset::{
     ConvertConfig, EpisodePictures, FrameChoice, RecordingEpisodes, convert, play_back, read_trials, validate,
 };
@@ -216,7 +216,7 @@ fn merged_datasets_have_the_pictures_and_statistics_of_one_converted_at_once() {
     for frames in [FrameChoice::Boundaries, FrameChoice::All] {
         let (folder, [a, b, whole]) = parts(frames);
         let merged = folder.path().join("merged");
-        let summary = merge(&[a, b], &merged).unwrap();
+        let summary = merge(&[a, b], &merged, Carry::Packets).unwrap();
         assert!(summary.files.iter().any(|file| file.ends_with(".mp4")));
         assert_eq!(validate(&merged).findings, []);
         for (camera, ..) in CAMERAS {
@@ -241,7 +241,13 @@ fn a_filtered_dataset_has_the_pictures_of_its_episodes_alone() {
     assert!(unseen[0] > 0 && unseen.len() > 1);
     let folder = tempfile::tempdir().unwrap();
     let (filtered, alone) = (folder.path().join("filtered"), folder.path().join("alone"));
-    filter(&made.root, &Condition { split: Some(Split::Unseen), ..Condition::default() }, &filtered).unwrap();
+    filter(
+        &made.root,
+        &Condition { split: Some(Split::Unseen.name().to_owned()), ..Condition::default() },
+        &filtered,
+        Carry::Packets,
+    )
+    .unwrap();
     let wanted: Vec<Episode> = unseen.iter().map(|&position| made.episodes[position].clone()).collect();
     convert_to(&[&film(folder.path(), "shard", &wanted, &cameras())], FrameChoice::Boundaries, &alone);
     assert_eq!(validate(&filtered).findings, []);
@@ -262,7 +268,7 @@ fn a_filtered_dataset_has_the_pictures_of_its_episodes_alone() {
 fn parts_of_a_split_dataset_hold_every_picture_once() {
     let made = made(FrameChoice::Boundaries);
     let folder = tempfile::tempdir().unwrap();
-    let parts = split(&made.root, &SplitBy::Task, &folder.path().join("parts")).unwrap();
+    let parts = split(&made.root, &SplitBy::Task, &folder.path().join("parts"), Carry::Packets).unwrap();
     let mut n_pictures = 0;
     for (name, _) in &parts {
         let part = folder.path().join("parts").join(name);
@@ -318,7 +324,7 @@ fn a_difference_names_the_pictures_that_changed() {
 fn pictures_that_do_not_fit_together_are_refused_by_name() {
     let (folder, [a, b, _]) = parts(FrameChoice::Boundaries);
     let refused = |sources: &[PathBuf], code: &str, words: &str| {
-        let error = merge(sources, &folder.path().join("merged")).unwrap_err().to_string();
+        let error = merge(sources, &folder.path().join("merged"), Carry::Packets).unwrap_err().to_string();
         assert!(error.starts_with(code) && error.contains(words), "{error:?} is no {code} with {words:?}");
     };
     let other = folder.path().join("other");

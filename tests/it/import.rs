@@ -7,7 +7,7 @@ use arrow::array::{ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray}
 use arrow::compute::concat_batches;
 use arrow::datatypes::Int64Type;
 use ntp::artifact::{read_json, sha256_file};
-use ntp::dataset::edit::{Condition, EditError, SplitBy, diff, filter, merge, repair, split};
+use ntp::dataset::edit::{Carry, Condition, EditError, SplitBy, diff, filter, merge, repair, split};
 use ntp::dataset::export::{LabelForm, export};
 use ntp::dataset::import::import;
 use ntp::dataset::{ConvertConfig, schema, summarize, validate};
@@ -60,7 +60,7 @@ fn sub_tasks_become_calls_below_a_root() {
     let folder = tempfile::tempdir().unwrap();
     let (source, to) = (folder.path().join("theirs"), folder.path().join("ours"));
     theirs(&source);
-    let summary = import(&source, &to).unwrap();
+    let summary = import(&source, None, &to).unwrap();
     let validation = validate(&to);
     assert_eq!(validation.findings, []);
     assert_eq!((validation.episodes, validation.frames), (6, summary.frames));
@@ -88,11 +88,13 @@ fn videos_and_features_of_types_of_others_stay_as_they_were() {
     let video = "videos/observation.images.front/chunk-000/file-000.mp4";
     std::fs::create_dir_all(source.join(video).parent().unwrap()).unwrap();
     std::fs::write(source.join(video), "a film").unwrap();
-    import(&source, &to).unwrap();
+    import(&source, None, &to).unwrap();
     assert_eq!(std::fs::read(to.join(video)).unwrap(), b"a film");
     let info: Value = read_json(&to.join("meta/info.json")).unwrap();
     assert_eq!(info["features"]["observation.images.front"], camera);
-    assert_eq!(validate(&to).findings, []);
+    // No episode says where its film is.
+    let codes: Vec<_> = validate(&to).findings.iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, ["info.names", "file.unlisted", "pictures.place"]);
 }
 
 #[test]
@@ -106,7 +108,7 @@ fn frames_without_a_sub_task_are_the_root_s_own() {
         rows[..3].fill(-1);
     });
     export(&own, LabelForm::SubtaskIndex, &source).unwrap();
-    import(&source, &to).unwrap();
+    import(&source, None, &to).unwrap();
     assert_eq!(validate(&to).findings, []);
     let mut calls = table::read(&to.join(CALLS), &schema::CALLS).unwrap();
     assert_eq!(calls.int64("frame_begin").unwrap()[..2], [0, 3]);
@@ -117,7 +119,7 @@ fn a_wrong_label_of_an_imported_dataset_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let (source, to) = (folder.path().join("theirs"), folder.path().join("ours"));
     theirs(&source);
-    import(&source, &to).unwrap();
+    import(&source, None, &to).unwrap();
     rewrite(&to, CALLS, &schema::CALLS, |columns| {
         let at = columns.iter().position(|(name, _)| name == "program").unwrap();
         let Column::Text(rows) = &mut columns[at].1 else { panic!() };
@@ -141,7 +143,7 @@ fn what_is_not_annotated_is_refused_by_name() {
         let _none = std::fs::remove_dir_all(&source);
         theirs(&source);
         change(&source);
-        let error = import(&source, &to).unwrap_err().to_string();
+        let error = import(&source, None, &to).unwrap_err().to_string();
         assert!(error.starts_with(code), "{error:?} is no {code}");
         assert!(!to.exists());
     };
@@ -159,7 +161,7 @@ fn what_is_not_annotated_is_refused_by_name() {
     });
     let own = tempfile::tempdir().unwrap();
     convert_all(&episodes(), &ConvertConfig::default(), own.path()).unwrap();
-    let error = import(own.path(), &to).unwrap_err().to_string();
+    let error = import(own.path(), None, &to).unwrap_err().to_string();
     assert!(error.starts_with("import.annotation"), "{error}");
 }
 
@@ -170,7 +172,7 @@ fn imported(folder: &Path, name: &str, change: impl FnOnce(&Path)) -> std::path:
     rewrite_any(&source.join(DATA), "subtask_index", |rows| rows[..3].fill(-1));
     change_info(&source, |info| info["tools"] = json!([{ "type": "function" }]));
     change(&source);
-    import(&source, &to).unwrap();
+    import(&source, None, &to).unwrap();
     to
 }
 
@@ -195,12 +197,12 @@ fn an_imported_dataset_is_split_and_merged_to_what_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let whole = imported(folder.path(), "whole", |_| {});
     let parts = folder.path().join("parts");
-    split(&whole, &SplitBy::Task, &parts).unwrap();
+    split(&whole, &SplitBy::Task, &parts, Carry::Packets).unwrap();
     let mut parts: Vec<_> = std::fs::read_dir(&parts).unwrap().map(|entry| entry.unwrap().path()).collect();
     parts.sort();
     assert_eq!(parts.len(), 3);
     let merged = folder.path().join("merged");
-    let summary = merge(&parts, &merged).unwrap();
+    let summary = merge(&parts, &merged, Carry::Packets).unwrap();
     assert_eq!((summary.episodes, summary.tasks), (6, 3));
     for dataset in parts.iter().chain([&merged]) {
         assert_eq!(validate(dataset).findings, []);
@@ -212,9 +214,9 @@ fn an_imported_dataset_is_split_and_merged_to_what_it_was() {
     assert!(difference.same == 6 && difference.is_none(), "{difference:?}");
     let filtered = folder.path().join("filtered");
     let condition = Condition { programs: vec!["block_stacking".to_owned()], ..Condition::default() };
-    assert!(filter(&whole, &condition, &filtered).unwrap().episodes > 0);
+    assert!(filter(&whole, &condition, &filtered, Carry::Packets).unwrap().episodes > 0);
     let unknown = Condition { programs: vec!["pick".to_owned()], ..Condition::default() };
-    let error = filter(&whole, &unknown, &folder.path().join("none")).unwrap_err().to_string();
+    let error = filter(&whole, &unknown, &folder.path().join("none"), Carry::Packets).unwrap_err().to_string();
     assert!(error.starts_with("edit.vocabulary") && error.contains("block_stacking"), "{error}");
     assert_eq!(validate(&filtered).findings, []);
 }
@@ -226,15 +228,15 @@ fn imported_datasets_are_merged_unless_an_episode_is_there_twice_or_they_are_non
     let other =
         imported(folder.path(), "other", |root| rewrite_any(&root.join(DATA), "subtask_index", |rows| rows[4] = -1));
     let merged = folder.path().join("merged");
-    assert_eq!(merge(&[first.clone(), other], &merged).unwrap().episodes, 12);
+    assert_eq!(merge(&[first.clone(), other], &merged, Carry::Packets).unwrap().episodes, 12);
     assert_eq!(validate(&merged).findings, []);
     let refused = |error: EditError, code: &str| assert!(error.to_string().starts_with(code), "{error} is no {code}");
     let to = folder.path().join("refused");
     let again = imported(folder.path(), "again", |_| {});
-    refused(merge(&[first.clone(), again], &to).unwrap_err(), "edit.episode");
+    refused(merge(&[first.clone(), again], &to, Carry::Packets).unwrap_err(), "edit.episode");
     let own = folder.path().join("own");
     convert_all(&episodes(), &ConvertConfig::default(), &own).unwrap();
-    refused(merge(&[first.clone(), own], &to).unwrap_err(), "edit.vocabulary");
+    refused(merge(&[first.clone(), own], &to, Carry::Packets).unwrap_err(), "edit.vocabulary");
     rewrite(&first, CALLS, &schema::CALLS, |columns| {
         let at = columns.iter().position(|(name, _)| name == "frame_end").unwrap();
         let Column::Int64(rows) = &mut columns[at].1 else { panic!() };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ntp::artifact::{read_json, sha256_file};
-use ntp::dataset::edit::{Condition, filter};
+use ntp::dataset::edit::{Carry, Condition, filter};
 use ntp::lineage::{LineageError, explain_episode, explain_model, stage_of};
 use ntp::task::Split;
 use serde_json::Value;
@@ -45,7 +45,13 @@ fn a_frame_leads_to_its_calls_its_recording_and_every_stage_before() {
 fn an_edited_dataset_leads_to_what_it_was_made_of() {
     let folder = copy_to("convert");
     let (dataset, edited) = (folder.path().join("dataset"), folder.path().join("deep/er/edited"));
-    filter(&dataset, &Condition { split: Some(Split::Seen), ..Condition::default() }, &edited).unwrap();
+    filter(
+        &dataset,
+        &Condition { split: Some(Split::Seen.name().to_owned()), ..Condition::default() },
+        &edited,
+        Carry::Packets,
+    )
+    .unwrap();
     let recordings = [folder.path().join("recordings")];
     let found = explain_episode(&edited, 0, None, &recordings).unwrap();
     assert!(found.frame.is_none() && found.recording.path.is_some());

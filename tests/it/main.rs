@@ -37,6 +37,7 @@ mod expert;
 #[cfg(test)]
 mod export;
 #[cfg(test)]
+mod foreign;
 mod forward;
 #[cfg(test)]
 mod fuzz;

@@ -14,7 +14,7 @@ fn an_imported_episode_is_shown_as_a_program_tree() {
     let folder = tempfile::tempdir().unwrap();
     let (source, ours) = (folder.path().join("theirs"), folder.path().join("ours"));
     theirs(&source);
-    import(&source, &ours).unwrap();
+    import(&source, None, &ours).unwrap();
     let playback = play_back(&ours, 2).unwrap();
     let calls: Vec<_> = playback.facts.calls.iter().map(|call| (call.depth, call.program.as_str())).collect();
     assert_eq!(calls, [(0, "task"), (1, "pick_and_place block_D block_B"), (1, "block_stacking")]);

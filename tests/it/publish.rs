@@ -264,7 +264,7 @@ fn the_card_of_a_dataset_that_was_annotated_elsewhere_claims_nothing_of_it() {
     let (theirs, imported, to) =
         (folder.path().join("theirs"), folder.path().join("imported"), folder.path().join("to"));
     crate::import::theirs(&theirs);
-    ntp::dataset::import::import(&theirs, &imported).unwrap();
+    ntp::dataset::import::import(&theirs, None, &imported).unwrap();
     let publication = Publication { creators: Vec::new(), ..publication() };
     publish(&imported, &Folder::new(&to), &publication, || true).unwrap();
     let card = std::fs::read_to_string(to.join("README.md")).unwrap();

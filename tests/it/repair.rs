@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ntp::dataset::edit::{EditError, EditSummary, diff, merge, repair};
+use ntp::dataset::edit::{Carry, EditError, EditSummary, diff, merge, repair};
 use ntp::dataset::{ConvertConfig, FrameChoice, schema, validate};
 use ntp::recording::{self, PlanSource, ShardReader, ShardWriter};
 use ntp::table::Column;
@@ -115,7 +115,7 @@ fn a_file_that_is_not_as_the_manifest_says_is_not_verified() {
     let folder = tempfile::tempdir().unwrap();
     let [small_one, whole, to] = ["small", "whole", "to"].map(|name| folder.path().join(name));
     small(&small_one);
-    merge(&[small_one], &whole).unwrap();
+    merge(&[small_one], &whole, Carry::Packets).unwrap();
     // No rule of the tables holds the seed.
     rewrite(&whole, "ntp/episodes.parquet", &schema::EPISODES, |columns| {
         let at = columns.iter().position(|(name, _)| name == "seed").unwrap();

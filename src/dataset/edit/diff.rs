@@ -1,18 +1,21 @@
 //! What differs between two datasets.
 //!
 //! Episodes are the same when they come from the same place of the same recording. They are compared by hashes of
-//! their rows, without what counts only where they lie; those that differ are then read again and told apart.
+//! their rows, without what counts only where they lie; those that differ are then read again and told apart. Where
+//! there are no program tables, nothing tells where an episode comes from: then it is known by what is in it.
 
 mod detail;
 mod digest;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::dataset::edit::EditError;
+use crate::dataset::edit::plain::diff::{self as plain, Contents, Digest};
 use crate::dataset::edit::source::Source;
+use crate::dataset::plain::has_programs;
 use detail::details;
 use digest::{EpisodeDigest, digests};
 
@@ -87,6 +90,9 @@ impl Difference {
 ///
 /// When one of them cannot be read.
 pub fn diff(before: &Path, after: &Path) -> Result<Difference, EditError> {
+    if !(has_programs(before) && has_programs(after)) {
+        return diff_plain(before, after);
+    }
     let settings = other_settings(&Source::open(before)?, &Source::open(after)?);
     let (first, second) = (digests(before)?, digests(after)?);
     let index = |digests: &[EpisodeDigest]| -> BTreeMap<[u64; 2], usize> {
@@ -114,6 +120,90 @@ pub fn diff(before: &Path, after: &Path) -> Result<Difference, EditError> {
         changed_episodes: details(before, after, &told)?,
         settings,
     })
+}
+
+/// The same where there are no program tables in both: an episode is known by what is in it, else by its number.
+fn diff_plain(before: &Path, after: &Path) -> Result<Difference, EditError> {
+    let (first, second) = (plain::digests(before)?, plain::digests(after)?);
+    let (mut a, mut b) = (Contents::open(before)?, Contents::open(after)?);
+    let mut left: BTreeSet<usize> = (0..second.len()).collect();
+    let mut places: BTreeMap<&Digest, Vec<usize>> = BTreeMap::new();
+    second.iter().enumerate().rev().for_each(|(at, content)| places.entry(content).or_default().push(at));
+    let mut found = Difference { settings: plain_settings(&a, &b), ..Difference::default() };
+    let mut others = Vec::new();
+    for (at, content) in first.iter().enumerate() {
+        let same = match second.get(at) {
+            Some(other) if other == content && left.contains(&at) => Some(at),
+            _ => places.get(content).and_then(|places| places.iter().rev().find(|at| left.contains(at)).copied()),
+        };
+        match same {
+            Some(place) => {
+                left.remove(&place);
+                found.same += 1;
+                found.moved += u64::from(place != at);
+            }
+            None => others.push(at),
+        }
+    }
+    let name = |contents: &Contents, at: usize| plain_name(contents, at);
+    for at in others {
+        if left.remove(&at) {
+            found.changed += 1;
+            if found.changed_episodes.len() < MAX_TOLD {
+                let frames = plain::differing(&mut a, &mut b, [at, at])?;
+                let before = name(&a, at);
+                let (after_index, nothing) = (at as i64, Vec::new());
+                let (episode_columns, calls, scopes) = (Vec::new(), nothing, 0);
+                found.changed_episodes.push(ChangedEpisode {
+                    before,
+                    after_index,
+                    episode_columns,
+                    calls,
+                    scopes,
+                    frames,
+                });
+            }
+        } else {
+            found.removed += 1;
+            if found.removed_episodes.len() < MAX_TOLD {
+                found.removed_episodes.push(name(&a, at));
+            }
+        }
+    }
+    found.added = left.len() as u64;
+    found.added_episodes = left.into_iter().take(MAX_TOLD).map(|at| name(&b, at)).collect();
+    Ok(found)
+}
+
+fn plain_name(contents: &Contents, at: usize) -> EpisodeName {
+    let episode = &contents.source.episodes[at];
+    EpisodeName {
+        episode_index: episode.index,
+        task_id: episode.tasks.join(", "),
+        recording: String::new(),
+        recording_index: episode.index,
+    }
+}
+
+fn plain_settings(before: &Contents, after: &Contents) -> Vec<String> {
+    let of = |contents: &Contents| {
+        let info = &contents.source.info;
+        let features: BTreeMap<_, _> = info
+            .features
+            .iter()
+            .map(|feature| (feature.name.clone(), (feature.dtype.clone(), feature.shape.clone())))
+            .collect();
+        [
+            ("fps", info.fps.to_string()),
+            (
+                "splits",
+                info.splits.iter().map(|(name, range)| format!("{name} {range:?}")).collect::<Vec<_>>().join(", "),
+            ),
+            ("features", format!("{features:?}")),
+        ]
+    };
+    let pairs = of(before).into_iter().zip(of(after));
+    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).collect()
 }
 
 fn other_settings(before: &Source, after: &Source) -> Vec<String> {

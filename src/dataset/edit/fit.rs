@@ -142,6 +142,12 @@ pub(super) struct Seen {
 impl Seen {
     /// Takes an episode down, if it is none of those before.
     pub(super) fn note(&mut self, root: &Path, row: &EpisodeRow) -> Result<(), EditError> {
+        self.note_episode(root, row)?;
+        self.note_task(&root.join(layout::EPISODES), row)
+    }
+
+    /// The same, whatever its task: of tasks of others nothing says that they are of one split.
+    pub(super) fn note_episode(&mut self, root: &Path, row: &EpisodeRow) -> Result<(), EditError> {
         let path = root.join(layout::EPISODES);
         let recording = self.recording(row);
         let flag = 1_u64 << row.recording_index.rem_euclid(64);
@@ -154,7 +160,7 @@ impl Seen {
             return Err(EditError::refused("edit.episode", &path, problem));
         }
         *flags |= flag;
-        self.note_task(&path, row)
+        Ok(())
     }
 
     /// Names the recording by its hash, or where it has none by its name.

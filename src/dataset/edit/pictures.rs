@@ -58,7 +58,7 @@ impl CarriedPictures {
             let store = match declared.dtype {
                 Dtype::Image => Store::Rows,
                 Dtype::Video => {
-                    let files = VideoFiles::new(root, name, size_px, info.fps, file_bytes);
+                    let files = VideoFiles::new(root, name, size_px, info.whole_fps(), file_bytes);
                     Store::Videos(Box::new(Videos { files, parameter_sets: Vec::new(), samples: Samples::new(name) }))
                 }
                 _ => return None,

@@ -12,13 +12,15 @@ use serde_json::json;
 
 use crate::artifact::{StageDir, StagedDir};
 use crate::dataset::edit::fit::check_version;
+use crate::dataset::edit::plain::repair::write_prefix;
 use crate::dataset::edit::samples::video_place;
-use crate::dataset::edit::source::{Source, SourceEpisode};
+use crate::dataset::edit::source::{Source, SourceEpisode, describe};
 use crate::dataset::edit::target::Target;
 use crate::dataset::edit::{EditError, EditSummary, commit};
-use crate::dataset::files::finding::{Severity, Validation};
+use crate::dataset::files::finding::{Finding, Severity, Validation};
 use crate::dataset::files::info::Dtype;
 use crate::dataset::files::layout;
+use crate::dataset::plain::{ProgramTables, program_tables};
 use crate::dataset::tables::episodes::read::EpisodeRows;
 use crate::dataset::validate::EpisodeChecks;
 
@@ -37,6 +39,9 @@ pub struct DatasetRepair {
 ///
 /// [`EditError::Refused`] when not even the first episode can be verified.
 pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
+    if program_tables(root) == ProgramTables::None {
+        return repair_plain(root, to);
+    }
     let (files, unreadable) = changed_files(root);
     let validation = crate::dataset::validate(root);
     let told = validation.findings.iter().filter(|finding| finding.severity == Severity::Error);
@@ -50,7 +55,7 @@ pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
     let (info, rows, total) = EpisodeRows::open_prefix(root)?;
     let mut prefix = Prefix::open(root, info, rows, files)?;
     let mut target = Target::create(staged.partial_path(), &prefix.source)?;
-    let mut description = prefix.source.describe()?;
+    let mut description = describe(root)?;
     let end = loop {
         match prefix.next_verified() {
             Ok(Some(episode)) => match target.append(&episode, &prefix.source) {
@@ -70,6 +75,24 @@ pub fn repair(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
     target.leave_out(total.saturating_sub(n_kept));
     description.episodes = [0, n_kept];
     let summary = target.finish(prefix.source.ntp.failed_left_out)?;
+    let settings = json!({ "left_out": summary.left_out });
+    commit("repair", &[description], settings, staged.partial_path(), &summary)?;
+    staged.commit()?;
+    Ok(DatasetRepair { reasons, written: Some(summary) })
+}
+
+/// The same of a dataset without program tables.
+fn repair_plain(root: &Path, to: &Path) -> Result<DatasetRepair, EditError> {
+    let validation = crate::dataset::validate(root);
+    let first = validation.findings.iter().find(|finding| finding.severity == Severity::Error);
+    let told = |of: &Finding| format!("{} {}: {} {}", of.code, of.path.display(), of.place, of.message);
+    let Some(first) = first else { return Ok(DatasetRepair { reasons: Vec::new(), written: None }) };
+    let staged = StagedDir::begin(to)?;
+    let (summary, end) = write_prefix(root, staged.partial_path())?;
+    let mut reasons = vec![told(first)];
+    reasons.extend(end.into_iter().filter(|end| *end != reasons[0]).collect::<Vec<_>>());
+    let mut description = describe(root)?;
+    description.episodes = [0, summary.episodes];
     let settings = json!({ "left_out": summary.left_out });
     commit("repair", &[description], settings, staged.partial_path(), &summary)?;
     staged.commit()?;

@@ -44,7 +44,7 @@ impl Samples {
         let (file, from_secs) = video_place(episode, &self.feature)
             .ok_or_else(|| failed(source.root(), format!("{}: no place of its video is given", self.feature)))?;
         let path = source.root().join(file.video(&self.feature));
-        let first = (from_secs * f64::from(source.info.fps)).round() as usize;
+        let first = (from_secs * source.info.fps).round() as usize;
         let n_samples = usize::try_from(episode.row.n_frames).unwrap_or(0);
         let packets = self.packets(&path, first, n_samples);
         packets.map_err(|error| failed(&path, format!("{}: {error}", self.feature)))

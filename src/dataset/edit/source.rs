@@ -96,15 +96,15 @@ impl Source {
         };
         Ok(Some(SourceEpisode { row, pieces }))
     }
+}
 
-    /// Names it for the plan of what is made of it.
-    pub(super) fn describe(&self) -> Result<SourceDescription, EditError> {
-        let path = self.root.canonicalize().unwrap_or_else(|_gone| self.root.clone());
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let version = version_of(&self.root)?;
-        let plan = StageDir::new("dataset", &self.root).plan()?;
-        Ok(SourceDescription { name, version, episodes: [0, 0], plan })
-    }
+/// Names a dataset for the plan of what is made of it.
+pub(super) fn describe(root: &Path) -> Result<SourceDescription, EditError> {
+    let path = root.canonicalize().unwrap_or_else(|_gone| root.to_owned());
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let version = version_of(root)?;
+    let plan = StageDir::new("dataset", root).plan()?;
+    Ok(SourceDescription { name, version, episodes: [0, 0], plan })
 }
 
 /// A hash of what a dataset holds: of its totals, its texts, its exact statistics and its rows per episode.

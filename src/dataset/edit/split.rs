@@ -6,12 +6,11 @@ use std::path::Path;
 use rand::Rng as _;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use serde_json::json;
 
-use crate::artifact::StagedDir;
-use crate::dataset::edit::source::{Source, SourceEpisode};
-use crate::dataset::edit::{EditError, EditSummary, write};
-use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
+use crate::dataset::edit::error::EditError;
+use crate::dataset::edit::words::EpisodeWords;
+use crate::dataset::plain::{PlainSource, has_programs};
+use crate::dataset::tables::episodes::read::EpisodeRows;
 use crate::seed::Seed;
 
 /// Parts that are made at most: each is a pass over the dataset.
@@ -51,37 +50,38 @@ pub enum Unit {
     Episode,
 }
 
-/// Writes the parts of a dataset as folders of their names below `to`, which appear together.
-///
-/// # Errors
-///
-/// [`EditError::Refused`] when a part would be empty, or there would be too many.
-pub fn split(root: &Path, by: &SplitBy, to: &Path) -> Result<Vec<(String, EditSummary)>, EditError> {
-    let names = part_names(root, by)?;
-    let staged = StagedDir::begin(to)?;
-    let mut summaries = Vec::new();
-    for name in names {
-        let mut draw = Draw::new(root, by)?;
-        let settings = json!({ "by": by, "part": name });
-        let is_wanted = |episode: &SourceEpisode| draw.part_of(&episode.row) == name;
-        let summary =
-            write("split", vec![Source::open(root)?], &staged.partial_path().join(&name), settings, is_wanted)?;
-        summaries.push((name, summary));
+/// Gives each episode of a dataset in words.
+fn each_episode(root: &Path, mut take: impl FnMut(&EpisodeWords<'_>)) -> Result<(), EditError> {
+    if has_programs(root) {
+        for row in EpisodeRows::open(root)?.1 {
+            take(&EpisodeWords::of_row(&row?));
+        }
+        return Ok(());
     }
-    staged.commit()?;
-    Ok(summaries)
+    let source = PlainSource::open(root)?;
+    source.episodes.iter().for_each(|episode| take(&EpisodeWords::of_plain(episode, &source.info)));
+    Ok(())
 }
 
 /// The parts that have episodes, in order of their names or as they are given.
-fn part_names(root: &Path, by: &SplitBy) -> Result<Vec<String>, EditError> {
+pub(super) fn part_names(root: &Path, by: &SplitBy) -> Result<Vec<String>, EditError> {
+    if !has_programs(root) && matches!(by, SplitBy::Family | SplitBy::Outcome) {
+        let problem =
+            "it has no program tables, so that nothing tells families and outcomes; allowed: split, task, shares";
+        return Err(EditError::refused("edit.parts", root, problem));
+    }
     let mut counts: BTreeMap<String, u64> = BTreeMap::new();
     let mut draw = Draw::new(root, by)?;
-    for row in EpisodeRows::open(root)?.1 {
-        *counts.entry(draw.part_of(&row?)).or_default() += 1;
-        if counts.len() > MAX_PARTS {
-            let problem = format!("it would have more than {MAX_PARTS} parts; filter it, or split it by shares");
-            return Err(EditError::refused("edit.parts", root, problem));
+    each_episode(root, |episode| {
+        let part = draw.part_of(episode);
+        // One more than may be is enough to refuse.
+        if counts.len() <= MAX_PARTS || counts.contains_key(&part) {
+            *counts.entry(part).or_default() += 1;
         }
+    })?;
+    if counts.len() > MAX_PARTS {
+        let problem = format!("it would have more than {MAX_PARTS} parts; filter it, or split it by shares");
+        return Err(EditError::refused("edit.parts", root, problem));
     }
     let SplitBy::Shares { parts, .. } = by else { return Ok(counts.into_keys().collect()) };
     if let Some((name, share)) = parts.iter().find(|(name, _)| !counts.contains_key(name)) {
@@ -92,13 +92,13 @@ fn part_names(root: &Path, by: &SplitBy) -> Result<Vec<String>, EditError> {
 }
 
 /// Tells the part of one episode after another.
-enum Draw<'b> {
-    Value(fn(&EpisodeRow) -> &str),
+pub(super) enum Draw<'b> {
+    Value(for<'e> fn(&EpisodeWords<'e>) -> &'e str),
     Shares(Box<Shares<'b>>),
 }
 
 /// Parts being drawn.
-struct Shares<'b> {
+pub(super) struct Shares<'b> {
     parts: &'b [(String, f64)],
     unit: Unit,
     /// Units that each part shall still have.
@@ -109,12 +109,12 @@ struct Shares<'b> {
 }
 
 impl<'b> Draw<'b> {
-    fn new(root: &Path, by: &'b SplitBy) -> Result<Self, EditError> {
+    pub(super) fn new(root: &Path, by: &'b SplitBy) -> Result<Self, EditError> {
         Ok(match by {
-            SplitBy::Split => Self::Value(|row| &row.split),
-            SplitBy::Task => Self::Value(|row| &row.task_id),
-            SplitBy::Family => Self::Value(|row| &row.family),
-            SplitBy::Outcome => Self::Value(|row| &row.outcome),
+            SplitBy::Split => Self::Value(|of| of.split),
+            SplitBy::Task => Self::Value(|of| of.task_id),
+            SplitBy::Family => Self::Value(|of| of.family),
+            SplitBy::Outcome => Self::Value(|of| of.outcome),
             SplitBy::Shares { parts, unit, seed } => {
                 check_shares(root, parts)?;
                 let left = quotas(parts, n_units(root, *unit)?);
@@ -126,15 +126,15 @@ impl<'b> Draw<'b> {
 
     /// Each unit goes to a part by chance, in proportion to the places that the parts have left: all orders of the
     /// units are equally likely, and the parts are as large as they shall be.
-    fn part_of(&mut self, row: &EpisodeRow) -> String {
+    pub(super) fn part_of(&mut self, episode: &EpisodeWords<'_>) -> String {
         match self {
-            Self::Value(of) => file_name(of(row)),
+            Self::Value(of) => file_name(of(episode)),
             Self::Shares(shares) => {
                 let Shares { parts, unit, left, rng, tasks } = &mut **shares;
-                let known = tasks.get(&row.task_id).copied();
+                let known = tasks.get(episode.task_id).copied();
                 let part = known.unwrap_or_else(|| next_part(left, rng));
                 if *unit == Unit::Task && known.is_none() {
-                    tasks.insert(row.task_id.clone(), part);
+                    tasks.insert(episode.task_id.to_owned(), part);
                 }
                 parts[part].0.clone()
             }
@@ -175,15 +175,14 @@ fn check_shares(root: &Path, parts: &[(String, f64)]) -> Result<(), EditError> {
 }
 
 fn n_units(root: &Path, unit: Unit) -> Result<u64, EditError> {
-    let (info, rows) = EpisodeRows::open(root)?;
-    if unit == Unit::Episode {
-        return Ok(info.total_episodes);
-    }
-    let mut tasks = BTreeSet::new();
-    for row in rows {
-        tasks.insert(row?.task_id);
-    }
-    Ok(tasks.len() as u64)
+    let (mut tasks, mut n_episodes) = (BTreeSet::new(), 0);
+    each_episode(root, |episode| {
+        n_episodes += 1;
+        if unit == Unit::Task {
+            tasks.insert(episode.task_id.to_owned());
+        }
+    })?;
+    Ok(if unit == Unit::Task { tasks.len() as u64 } else { n_episodes })
 }
 
 /// How many units each part has: by its share, rounded so that the sum is right.

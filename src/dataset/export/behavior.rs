@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::artifact::write_json;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
-use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
+use crate::dataset::export::labels::{Label, LabelReader, LabelledCalls, LabelledEpisode};
 
 #[derive(Serialize)]
 struct Annotation {
@@ -86,7 +86,7 @@ fn skill(episode: &LabelledEpisode, at: usize, label: &Label) -> Skill {
     let objects = objects(episode, label.call);
     Skill {
         skill_idx: at,
-        skill_id: [episode.calls[label.call].program.index()],
+        skill_id: [program_id(episode, label)],
         skill_description: [label.text.clone()],
         skill_type: ["uncoordinated"],
         manipulating_object_id: objects.clone(),
@@ -98,12 +98,11 @@ fn skill(episode: &LabelledEpisode, at: usize, label: &Label) -> Skill {
 }
 
 fn primitive(episode: &LabelledEpisode, at: usize, label: &Label, skills: &[Label]) -> Primitive {
-    let call = &episode.calls[label.call];
-    let caller = call.caller.map(|caller| caller.0 as usize);
+    let caller = episode.caller(label.call);
     let objects = objects(episode, label.call);
     Primitive {
         primitive_idx: at,
-        primitive_id: [call.program.index()],
+        primitive_id: [program_id(episode, label)],
         primitive_description: [label.text.clone()],
         primitive_type: ["uncoordinated"],
         manipulating_object_id: objects.clone(),
@@ -115,9 +114,19 @@ fn primitive(episode: &LabelledEpisode, at: usize, label: &Label, skills: &[Labe
     }
 }
 
+/// The program's number; of annotated ones, that of the first call of the episode with the same text.
+fn program_id(episode: &LabelledEpisode, label: &Label) -> usize {
+    match &episode.calls {
+        LabelledCalls::Own(calls) => calls[label.call].program.index(),
+        LabelledCalls::Annotated(calls) => {
+            calls.iter().position(|call| call.program == label.text).unwrap_or(label.call)
+        }
+    }
+}
+
 /// The slots that a call and those below it move to, in order of first use.
 fn objects(episode: &LabelledEpisode, position: usize) -> Vec<String> {
-    let calls = &episode.calls;
+    let LabelledCalls::Own(calls) = &episode.calls else { return Vec::new() };
     let below = calls[position + 1..].iter().take_while(|call| call.depth > calls[position].depth);
     let mut objects: Vec<String> = Vec::new();
     for slot in calls[position..=position].iter().chain(below).filter_map(|call| call.argument) {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
-use crate::dataset::export::labels::{LabelReader, LabelledEpisode};
+use crate::dataset::export::labels::{LabelReader, LabelledCalls, LabelledEpisode};
 use crate::recording::EventWriter;
-use crate::trace::sentence;
+use crate::trace::{Span, sentence};
 
 /// Time between the end of an episode and the next one's start, as in recordings.
 const GAP_NANOS: u64 = 1_000_000_000;
@@ -18,13 +18,14 @@ pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> 
     let mut start_nanos = 0;
     for episode in LabelReader::open(root)?.1 {
         let episode = episode?;
-        let mut by_end: Vec<usize> = (0..episode.calls.len()).collect();
+        let calls = spans(&episode);
+        let mut by_end: Vec<usize> = (0..calls.len()).collect();
         // Callees return before their callers.
-        by_end.sort_by_key(|&call| (episode.calls[call].frames.end, std::cmp::Reverse(episode.calls[call].depth)));
+        by_end.sort_by_key(|&call| (calls[call].0.end, std::cmp::Reverse(calls[call].1)));
         for call in by_end {
-            let frames = episode.calls[call].frames;
+            let frames = calls[call].0;
             let ends = [frames.begin, frames.last()].map(|frame| start_nanos + nanos(&episode, frame));
-            writer.write(ends, metadata(&episode, call))?;
+            writer.write(ends, metadata(&episode, call, calls[call]))?;
             summary.labels += 1;
         }
         summary.episodes += 1;
@@ -42,18 +43,33 @@ fn to_nanos(secs: f64) -> u64 {
     (secs * 1e9).round() as u64
 }
 
-fn metadata(episode: &LabelledEpisode, position: usize) -> Vec<(&'static str, String)> {
-    let call = &episode.calls[position];
+/// Frames and depth of each call.
+fn spans(episode: &LabelledEpisode) -> Vec<(Span, u8)> {
+    match &episode.calls {
+        LabelledCalls::Own(calls) => calls.iter().map(|call| (call.frames, call.depth)).collect(),
+        LabelledCalls::Annotated(calls) => {
+            calls.iter().map(|call| (Span { begin: call.frames[0], end: call.frames[1] }, call.depth)).collect()
+        }
+    }
+}
+
+fn metadata(episode: &LabelledEpisode, position: usize, (frames, depth): (Span, u8)) -> Vec<(&'static str, String)> {
+    let (program, id) = match &episode.calls {
+        LabelledCalls::Own(calls) => (calls[position].program.name().to_owned(), calls[position].id.0),
+        LabelledCalls::Annotated(calls) => (calls[position].program.clone(), calls[position].call_id),
+    };
     let mut metadata = vec![
-        ("program", call.program.name().to_owned()),
+        ("program", program),
         ("episode", episode.row.episode_index.to_string()),
         ("task", episode.row.task_id.clone()),
-        ("call", call.id.0.to_string()),
-        ("depth", call.depth.to_string()),
-        ("frames", format!("{}..{}", call.frames.begin, call.frames.end)),
+        ("call", id.to_string()),
+        ("depth", depth.to_string()),
+        ("frames", format!("{}..{}", frames.begin, frames.end)),
     ];
-    metadata.extend(call.argument.map(|slot| ("argument", episode.slot(usize::from(slot.0)).to_owned())));
-    let sentence = sentence(&episode.calls, position, |slot| episode.slot(slot));
-    metadata.extend(sentence.map(|sentence| ("instruction", sentence)));
+    metadata.extend(episode.argument(position).map(|argument| ("argument", argument.to_owned())));
+    if let LabelledCalls::Own(calls) = &episode.calls {
+        let sentence = sentence(calls, position, |slot| episode.slot(slot));
+        metadata.extend(sentence.map(|sentence| ("instruction", sentence)));
+    }
     metadata
 }

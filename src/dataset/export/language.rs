@@ -16,7 +16,7 @@ use arrow::error::ArrowError;
 
 use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
-use crate::dataset::export::labels::{Label, LabelReader, LabelledEpisode};
+use crate::dataset::export::labels::{Label, LabelReader, LabelledCalls, LabelledEpisode};
 use crate::dataset::export::plain::{copy_files, with_columns, write_frames};
 use crate::dataset::files::info::Dtype;
 use crate::dataset::files::info::FeatureInfo;
@@ -37,7 +37,7 @@ pub(crate) struct Entry {
 /// Writes the dataset with both columns.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
     let (info, reader) = LabelReader::open(root)?;
-    let mut language = Language { reader, fps: info.fps.max(1), open: Vec::new(), frames_left: 0, n_entries: 0 };
+    let mut language = Language { reader, fps: info.fps, open: Vec::new(), frames_left: 0, n_entries: 0 };
     let declared = || FeatureInfo { dtype: Dtype::Language, shape: vec![1], names: None, info: None };
     let features = [PERSISTENT, EVENTS].map(|name| (name.to_owned(), declared()));
     let (info, _) = write_frames(root, to, features.into(), |rows| language.annotate(&rows))?;
@@ -48,7 +48,7 @@ pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> 
 /// The entries of one episode after another.
 struct Language {
     reader: LabelReader,
-    fps: u32,
+    fps: f64,
     /// Of the episode that the next frame belongs to.
     open: Vec<Entry>,
     frames_left: usize,
@@ -89,17 +89,18 @@ impl Language {
 }
 
 /// What an episode says, in order of time.
-fn entries(episode: &LabelledEpisode, fps: u32) -> Vec<Entry> {
+fn entries(episode: &LabelledEpisode, fps: f64) -> Vec<Entry> {
     let entry = |style: &'static str, begin: u32, content: String| {
         // As `timestamp` is made, so that both are equal.
-        Entry { timestamp: (f64::from(begin) / f64::from(fps)) as f32, style, content }
+        Entry { timestamp: (f64::from(begin) / fps) as f32, style, content }
     };
     let subtasks = episode.subtasks();
+    let is_own = matches!(episode.calls, LabelledCalls::Own(_));
     let plans = (0..subtasks.len()).map(|at| entry("plan", subtasks[at].begin, numbered(&subtasks[at..])));
     let skills = episode.skills().into_iter().map(|label| entry("subtask", label.begin, label.text));
     let motions = episode.primitives().into_iter().map(|label| {
-        let argument = episode.calls[label.call].argument.map(|slot| episode.slot(usize::from(slot.0)));
-        let words = label.text.replace('_', " ");
+        let argument = episode.argument(label.call);
+        let words = if is_own { label.text.replace('_', " ") } else { label.text };
         entry("motion", label.begin, argument.map_or(words.clone(), |argument| format!("{words} {argument}")))
     });
     let mut entries: Vec<Entry> = plans.chain(skills).chain(motions).collect();

@@ -15,6 +15,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::plain::{ProgramTables, program_tables};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::dataset::tables::frames::feature::action_of;
 use crate::dataset::tables::frames::write::FrameRows;
@@ -37,13 +38,11 @@ pub(super) fn write_frames(
     further: Vec<(String, FeatureInfo)>,
     change: impl FnMut(RecordBatch) -> Result<RecordBatch, EditError>,
 ) -> Result<(Info, u64), EditError> {
-    let mut info: Info = read_json(&root.join(layout::INFO))?;
+    let info: Info = read_json(&root.join(layout::INFO))?;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
     copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots, action_of(&info)), change)?;
     copy_folder(&root.join(layout::VIDEOS), &to.join(layout::VIDEOS))?;
-    info.features.0.retain(|(name, _)| !is_ours(name));
-    info.features.0.extend(further);
-    write_json(&to.join(layout::INFO), &info)?;
+    write_info(root, to, &info, further)?;
     let mut stats: BTreeMap<String, Value> = read_json(&root.join(layout::STATS))?;
     stats.retain(|name, _| !is_ours(name));
     write_json(&to.join(layout::STATS), &stats)?;
@@ -52,6 +51,25 @@ pub(super) fn write_frames(
     }
     let labels = info.total_frames;
     Ok((info, labels))
+}
+
+/// Writes what is declared: of an imported dataset all that others have declared, which is more than is known here.
+fn write_info(root: &Path, to: &Path, info: &Info, further: Vec<(String, FeatureInfo)>) -> Result<(), EditError> {
+    let path = to.join(layout::INFO);
+    if program_tables(root) == ProgramTables::Own {
+        let mut info = info.clone();
+        info.features.0.retain(|(name, _)| !is_ours(name));
+        info.features.0.extend(further);
+        return Ok(write_json(&path, &info)?);
+    }
+    let mut theirs: Value = read_json(&root.join(layout::INFO))?;
+    if let Some(features) = theirs["features"].as_object_mut() {
+        features.retain(|name, _| !is_ours(name));
+        for (name, feature) in further {
+            features.insert(name, serde_json::to_value(feature).unwrap_or_default());
+        }
+    }
+    Ok(write_json(&path, &theirs)?)
 }
 
 /// Copies a folder with all that is in it, where it is there.
@@ -78,7 +96,7 @@ pub(super) fn is_ours(name: &str) -> bool {
 }
 
 /// Writes each file of a folder again, without columns of ours and changed by `change`.
-pub(in crate::dataset) fn copy_files(
+pub(super) fn copy_files(
     root: &Path,
     to: &Path,
     (folder, name): (&str, &str),

@@ -25,7 +25,7 @@ use crate::dataset::schema::META_EPISODES;
 type LabelsOf = fn(&LabelledEpisode) -> Vec<Label>;
 
 /// The two levels and where they come from.
-const LEVELS: [(&str, LabelsOf); 2] = [("sparse", LabelledEpisode::subtasks), ("dense", LabelledEpisode::skills)];
+const LEVELS: [(&str, LabelsOf); 2] = [("sparse", LabelledEpisode::subtasks), ("dense", LabelledEpisode::dense)];
 
 /// Writes the dataset with SARM's columns.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
@@ -66,12 +66,12 @@ struct Columns {
 }
 
 impl Columns {
-    fn add(&mut self, labels: &[Label], fps: u32) {
+    fn add(&mut self, labels: &[Label], fps: f64) {
         self.lengths.push(labels.len());
         for label in labels {
             self.names.push(label.text.clone());
             for (at, frame) in [label.begin, label.end - 1].into_iter().enumerate() {
-                self.times[at].push(f64::from(frame) / f64::from(fps.max(1)));
+                self.times[at].push(f64::from(frame) / fps);
                 self.frames[at].push(i64::from(frame));
             }
         }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::dataset::DatasetError;
+use crate::dataset::files::pointer::pointer_problem;
 use crate::table::TableError;
 
 /// Findings that are kept; those after it are only counted.
@@ -67,6 +68,8 @@ impl Validation {
     }
 
     pub(crate) fn error(&mut self, code: &'static str, path: &Path, place: String, message: String) {
+        let pointer = if code == "file.unreadable" { pointer_problem(path) } else { None };
+        let (code, message) = pointer.map_or((code, message), |problem| ("file.pointer", problem.to_owned()));
         self.add(Finding { code, severity: Severity::Error, path: path.to_owned(), place, message });
     }
 

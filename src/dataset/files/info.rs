@@ -17,6 +17,7 @@ const VIDEO_FILE_MEGABYTES: u32 = 200;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Info {
     pub(crate) codebase_version: String,
+    #[serde(default, deserialize_with = "or_unknown")]
     pub(crate) robot_type: String,
     pub(crate) total_episodes: u64,
     pub(crate) total_frames: u64,
@@ -24,9 +25,12 @@ pub(crate) struct Info {
     pub(crate) chunks_size: u32,
     pub(crate) data_files_size_in_mb: u32,
     pub(crate) video_files_size_in_mb: u32,
-    pub(crate) fps: u32,
+    #[serde(serialize_with = "as_whole_where_it_is")]
+    pub(crate) fps: f64,
+    #[serde(default)]
     pub(crate) splits: BTreeMap<String, String>,
     pub(crate) data_path: String,
+    #[serde(default, deserialize_with = "or_unknown")]
     pub(crate) video_path: String,
     #[serde(serialize_with = "in_order")]
     pub(crate) features: Features,
@@ -71,6 +75,7 @@ pub(crate) enum Dtype {
 
 /// What `LeRobot` wants to know of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct CameraInfo {
     #[serde(rename = "video.height")]
     height: u32,
@@ -80,18 +85,34 @@ pub(crate) struct CameraInfo {
     codec: String,
     #[serde(rename = "video.pix_fmt")]
     pix_fmt: String,
-    #[serde(rename = "video.is_depth_map")]
+    #[serde(rename = "video.is_depth_map", alias = "is_depth_map")]
     is_depth_map: bool,
-    #[serde(rename = "video.fps")]
-    fps: u32,
+    #[serde(rename = "video.fps", serialize_with = "as_whole_where_it_is")]
+    fps: f64,
     #[serde(rename = "video.channels")]
     channels: u32,
     has_audio: bool,
 }
 
+impl Default for CameraInfo {
+    fn default() -> Self {
+        Self { codec: String::new(), ..Self::h264([0, 0], 0.0) }
+    }
+}
+
+/// A rate as LeRobot writes it: whole where it is.
+pub(crate) fn as_whole_where_it_is<S: Serializer>(fps: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    if fps.fract() == 0.0 { serializer.serialize_u64(*fps as u64) } else { serializer.serialize_f64(*fps) }
+}
+
+/// Others leave out texts that say nothing of a dataset, or give none.
+fn or_unknown<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    Ok(Option::<String>::deserialize(deserializer)?.unwrap_or_default())
+}
+
 impl CameraInfo {
     /// Of a video in H.264.
-    pub(crate) fn h264([width, height]: [u32; 2], fps: u32) -> Self {
+    pub(crate) fn h264([width, height]: [u32; 2], fps: f64) -> Self {
         let (codec, pix_fmt) = ("h264".to_owned(), "yuv420p".to_owned());
         Self { height, width, codec, pix_fmt, is_depth_map: false, fps, channels: 3, has_audio: false }
     }
@@ -127,7 +148,12 @@ fn in_order<S: Serializer>(features: &Features, serializer: S) -> Result<S::Ok, 
 }
 
 impl Info {
-    pub(crate) fn new(totals: Totals, features: Features, fps: u32, file_megabytes: u32) -> Self {
+    /// Rows a second of a dataset of ours, which are whole.
+    pub(crate) fn whole_fps(&self) -> u32 {
+        self.fps as u32
+    }
+
+    pub(crate) fn new(totals: Totals, features: Features, fps: f64, file_megabytes: u32) -> Self {
         Self {
             codebase_version: LEROBOT_VERSION.to_owned(),
             robot_type: "ntp_gripper".to_owned(),

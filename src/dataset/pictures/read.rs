@@ -70,7 +70,7 @@ impl EpisodePictures {
             return Err(DatasetError::Count { path, problem });
         };
         let is_video = declared.dtype == Dtype::Video;
-        let episodes = places(root, &feature, is_video, f64::from(info.fps), info.total_episodes)?;
+        let episodes = places(root, &feature, is_video, info.fps, info.total_episodes)?;
         let files = if is_video { Files::Videos(OpenFiles::default()) } else { Files::Images(OpenFiles::default()) };
         Ok(Self { root: root.to_owned(), feature, size_px: [width as u32, height as u32], episodes, files })
     }

@@ -226,7 +226,7 @@ impl PictureFeature {
         let names = ["height", "width", "channels"].map(ToOwned::to_owned);
         let (dtype, info) = match self.store {
             Store::Column(_) => (Dtype::Image, None),
-            Store::Videos(_) => (Dtype::Video, Some(CameraInfo::h264(self.size_px, fps))),
+            Store::Videos(_) => (Dtype::Video, Some(CameraInfo::h264(self.size_px, f64::from(fps)))),
         };
         let shape = vec![height as usize, width as usize, 3];
         (self.name.clone(), FeatureInfo { dtype, shape, names: Some(names.into()), info })

@@ -171,7 +171,9 @@ impl PlainColumn {
             }
             PlainKind::Text => FeatureInfo { dtype: Dtype::String, shape: vec![1], names: None, info: None },
             PlainKind::Image(size_px) => of_picture(*size_px, Dtype::Image, None),
-            PlainKind::Video(size_px) => of_picture(*size_px, Dtype::Video, Some(CameraInfo::h264(*size_px, self.fps))),
+            PlainKind::Video(size_px) => {
+                of_picture(*size_px, Dtype::Video, Some(CameraInfo::h264(*size_px, f64::from(self.fps))))
+            }
         };
         (self.feature.name.clone(), info)
     }

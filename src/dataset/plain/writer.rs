@@ -223,7 +223,7 @@ impl PlainWriter {
             chunks_size: CHUNK_FILES,
             data_files_size_in_mb: self.file_megabytes,
             video_files_size_in_mb: self.file_megabytes,
-            fps: self.fps,
+            fps: f64::from(self.fps),
             splits: [("train".to_owned(), format!("0:{}", summary.episodes))].into(),
             data_path: "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet".to_owned(),
             video_path: "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4".to_owned(),

@@ -7,8 +7,9 @@ use serde::Serialize;
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
-use crate::dataset::files::info::NtpInfo;
+use crate::dataset::files::info::{NtpInfo, as_whole_where_it_is};
 use crate::dataset::files::layout;
+use crate::dataset::plain::{Declared, DeclaredKind, PlainSource, has_programs};
 use crate::dataset::tables::episodes::read::EpisodeRows;
 
 /// What a dataset is made of.
@@ -16,10 +17,10 @@ use crate::dataset::tables::episodes::read::EpisodeRows;
 pub struct DatasetSummary {
     /// Version of the `LeRobot` format, e.g. `v3.0`.
     pub lerobot_version: String,
-    /// Version of the program tables.
-    pub ntp_schema_version: u32,
-    /// Version of the program that wrote it.
-    pub ntp_version: String,
+    /// Version of the program tables; `None` for a dataset without.
+    pub ntp_schema_version: Option<u32>,
+    /// Version of the program that wrote it; `None` for one that was written elsewhere.
+    pub ntp_version: Option<String>,
     /// Which recorded frames are rows: `boundaries` or `all`.
     pub frames: String,
     /// Task families.
@@ -27,7 +28,8 @@ pub struct DatasetSummary {
     /// Names of the slots.
     pub slots: Vec<String>,
     /// Rows per second that `timestamp` claims.
-    pub fps: u32,
+    #[serde(serialize_with = "as_whole_where_it_is")]
+    pub fps: f64,
     /// Episodes.
     pub total_episodes: u64,
     /// Rows of `data/`.
@@ -48,6 +50,22 @@ pub struct DatasetSummary {
     pub outcomes: BTreeMap<String, u64>,
     /// Least and most frames of an episode.
     pub episode_frames: [i64; 2],
+    /// What a dataset without program tables declares.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared: Option<DeclaredSummary>,
+}
+
+/// What a dataset declares.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeclaredSummary {
+    /// The robot.
+    pub robot_type: Option<String>,
+    /// Features: type and shape, and of videos the codec.
+    pub features: BTreeMap<String, String>,
+    /// Forms of labels that it has, by the names that `ntp dataset import --labels` takes.
+    pub labels: Vec<&'static str>,
+    /// Distinct texts of tasks, the first ten.
+    pub tasks: Vec<String>,
 }
 
 /// Reads what a dataset is, from its JSON files and its rows per episode.
@@ -56,12 +74,15 @@ pub struct DatasetSummary {
 ///
 /// When one of these cannot be read.
 pub fn summarize(root: &Path) -> Result<DatasetSummary, DatasetError> {
+    if !has_programs(root) {
+        return summarize_plain(&PlainSource::open(root)?);
+    }
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
     let (info, rows) = EpisodeRows::open(root)?;
     let mut summary = DatasetSummary {
         lerobot_version: info.codebase_version,
-        ntp_schema_version: ntp.schema_version,
-        ntp_version: ntp.ntp_version,
+        ntp_schema_version: Some(ntp.schema_version),
+        ntp_version: Some(ntp.ntp_version),
         frames: ntp.frames,
         families: ntp.families,
         slots: ntp.slots,
@@ -76,6 +97,7 @@ pub fn summarize(root: &Path) -> Result<DatasetSummary, DatasetError> {
         actors: BTreeMap::new(),
         outcomes: BTreeMap::new(),
         episode_frames: [i64::MAX, 0],
+        declared: None,
     };
     let mut tasks = BTreeSet::new();
     for row in rows {
@@ -89,4 +111,51 @@ pub fn summarize(root: &Path) -> Result<DatasetSummary, DatasetError> {
     }
     summary.total_tasks = tasks.len() as u64;
     Ok(summary)
+}
+
+/// The same of a dataset without program tables: of its declarations and its rows per episode.
+fn summarize_plain(source: &PlainSource) -> Result<DatasetSummary, DatasetError> {
+    let info = &source.info;
+    let lengths = || source.episodes.iter().map(|episode| episode.length as i64);
+    let mut splits: BTreeMap<String, u64> = BTreeMap::new();
+    for at in 0..source.episodes.len() as u64 {
+        *splits.entry(info.split_of(at).unwrap_or("none").to_owned()).or_default() += 1;
+    }
+    let tasks = source.tasks.rows.iter().map(|(_, text)| text.clone());
+    let declared = DeclaredSummary {
+        robot_type: info.json["robot_type"].as_str().map(ToOwned::to_owned),
+        features: info.features.iter().map(|feature| (feature.name.clone(), words(feature))).collect(),
+        labels: source.label_forms(),
+        tasks: tasks.take(10).collect(),
+    };
+    Ok(DatasetSummary {
+        lerobot_version: info.version.name().to_owned(),
+        ntp_schema_version: None,
+        ntp_version: None,
+        frames: "all".to_owned(),
+        families: Vec::new(),
+        slots: Vec::new(),
+        fps: info.fps,
+        total_episodes: source.episodes.len() as u64,
+        total_frames: source.episodes.iter().map(|episode| episode.length).sum(),
+        total_calls: 0,
+        total_scopes: 0,
+        total_tasks: source.tasks.rows.len() as u64,
+        failed_left_out: 0,
+        splits,
+        actors: BTreeMap::new(),
+        outcomes: BTreeMap::new(),
+        episode_frames: [lengths().min().unwrap_or(0), lengths().max().unwrap_or(0)],
+        declared: Some(declared),
+    })
+}
+
+/// `float32 [7]`, or `video [480, 640, 3] in av1`.
+fn words(feature: &Declared) -> String {
+    let words = format!("{} {:?}", feature.dtype, feature.shape);
+    let codec = feature.video("video.codec").and_then(|codec| codec.as_str());
+    match codec.filter(|_| feature.kind == DeclaredKind::Video) {
+        Some(codec) => format!("{words} in {codec}"),
+        None => words,
+    }
 }

@@ -6,16 +6,66 @@ use crate::artifact::read_json;
 use crate::dataset::DatasetError;
 use crate::dataset::files::info::{Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::files::pointer::pointer_problem;
+use crate::dataset::plain::{EPISODE_LINES, PlainSource, has_programs};
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, SCOPES, SUBTASKS, TASKS};
-use crate::table::{TableReader, TableSchema};
+use crate::table::{Column, TableReader, TableSchema};
 
-/// The files of each table, by the table's name. Only footers are read.
+/// Where the rows of a table are.
+#[derive(Clone, Debug)]
+pub enum TableFiles {
+    /// In files of Parquet.
+    Parquet(Vec<PathBuf>),
+    /// In lines of JSON, which were read.
+    Columns(PathBuf, Vec<(&'static str, Column)>),
+}
+
+/// The files of each table, by the table's name. Only footers are read. A dataset without program tables has frames,
+/// episodes as `LeRobot` has them, tasks, and sub-tasks where there are any.
 ///
 /// # Errors
 ///
 /// When a file cannot be opened, or the files of a table have another number of rows than the dataset counts: then one
 /// is missing.
-pub fn table_files(root: &Path) -> Result<Vec<(&'static str, Vec<PathBuf>)>, DatasetError> {
+pub fn table_files(root: &Path) -> Result<Vec<(&'static str, TableFiles)>, DatasetError> {
+    if !has_programs(root) {
+        return plain_tables(PlainSource::open(root)?);
+    }
+    let files = own_tables(root)?;
+    Ok(files.into_iter().map(|(name, files)| (name, TableFiles::Parquet(files))).collect())
+}
+
+fn plain_tables(source: PlainSource) -> Result<Vec<(&'static str, TableFiles)>, DatasetError> {
+    if let Some((path, problem)) = source.data_files.iter().find_map(|path| Some((path, pointer_problem(path)?))) {
+        return Err(DatasetError::Count { path: path.clone(), problem: problem.to_owned() });
+    }
+    let root = source.info.root().to_owned();
+    let mut tables = Vec::new();
+    if source.info.version.is_by_episode() {
+        let (numbers, texts): (Vec<i64>, Vec<String>) = source.tasks.rows.iter().cloned().unzip();
+        let tasks = vec![("task_index", Column::Int64(numbers)), ("task", Column::Text(texts))];
+        tables.push((TASKS.name(), TableFiles::Columns(root.join("meta/tasks.jsonl"), tasks)));
+        let episodes = &source.episodes;
+        let columns = vec![
+            ("episode_index", Column::Int64(episodes.iter().map(|episode| episode.index).collect())),
+            ("tasks", Column::TextList(episodes.iter().map(|episode| episode.tasks.clone()).collect())),
+            ("length", Column::Int64(episodes.iter().map(|episode| episode.length as i64).collect())),
+        ];
+        tables.push((EPISODES.name(), TableFiles::Columns(root.join(EPISODE_LINES), columns)));
+    } else {
+        tables.push((TASKS.name(), TableFiles::Parquet(vec![root.join(layout::TASKS)])));
+        tables.push((EPISODES.name(), TableFiles::Parquet(source.episode_files)));
+    }
+    if source.subtasks.is_some() {
+        tables.push((SUBTASKS.name(), TableFiles::Parquet(vec![root.join(layout::SUBTASKS)])));
+    }
+    if !source.data_files.is_empty() {
+        tables.push((FRAMES.name(), TableFiles::Parquet(source.data_files)));
+    }
+    Ok(tables)
+}
+
+fn own_tables(root: &Path) -> Result<Vec<(&'static str, Vec<PathBuf>)>, DatasetError> {
     let info: Info = read_json(&root.join(layout::INFO))?;
     let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
     let rolling = [

@@ -5,15 +5,19 @@ use std::collections::BTreeSet;
 use crate::artifact::sha256_bytes;
 use crate::trace::Span;
 
+/// The family of tasks of others.
+pub(crate) const FAMILY: &str = "annotated";
 /// Name of the root program.
 pub(crate) const ROOT: &str = "task";
-/// What a dataset that was annotated elsewhere says in `ntp/info.json`.
-pub(crate) const ANNOTATED_BY: &str = "subtask_index";
-
-/// A call: the root's, or that of a sub-task. What it is given and what it hands on are its frames.
+/// A call: the root's, or that of a label. It sees all frames of its episode, and hands on its own.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AnnotatedCall<'t> {
-    pub(crate) program: &'t str,
+pub(crate) struct AnnotatedCall {
+    /// Number of its text; `None` for the root.
+    pub(crate) text: Option<u32>,
+    /// Position of the call that it lies in.
+    pub(crate) caller: Option<u32>,
+    /// 0 for the root.
+    pub(crate) depth: u8,
     pub(crate) frames: Span,
 }
 

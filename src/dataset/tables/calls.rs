@@ -4,7 +4,7 @@ pub(crate) mod check;
 pub(crate) mod facts;
 pub(crate) mod read;
 
-use crate::dataset::tables::annotated::AnnotatedCall;
+use crate::dataset::tables::annotated::{AnnotatedCall, ROOT};
 use crate::dataset::tables::view::{CallSpans, EpisodeView};
 use crate::table::{TableRows as _, table};
 use crate::trace::{ProgramCall, sentence};
@@ -86,17 +86,37 @@ impl Rows {
         }
     }
 
-    /// Adds the calls of an episode that was annotated elsewhere: the root, then what it calls.
-    pub(crate) fn append_annotated(&mut self, calls: &[AnnotatedCall<'_>], episode_index: i64, n_frames: i64) {
-        for (position, AnnotatedCall { program, frames }) in calls.iter().enumerate() {
-            let (begin, end, is_root) = (i64::from(frames.begin), i64::from(frames.end), position == 0);
+    /// Adds the calls of an episode that was annotated elsewhere, callers before callees; `texts` are those of programs.
+    pub(crate) fn append_annotated(
+        &mut self,
+        calls: &[AnnotatedCall],
+        texts: &[String],
+        episode_index: i64,
+        n_frames: i64,
+    ) {
+        // How many callees each call has had so far, and which was the last of each.
+        let mut steps = vec![0; calls.len()];
+        let mut last = vec![None; calls.len()];
+        for (position, call) in calls.iter().enumerate() {
+            if let Some(last) = call.caller.and_then(|caller| last.get_mut(caller as usize)) {
+                *last = Some(position);
+            }
+        }
+        for (position, call) in calls.iter().enumerate() {
+            let (begin, end) = (i64::from(call.frames.begin), i64::from(call.frames.end));
+            let caller = call.caller.map(|caller| caller as usize);
+            let step = caller.map_or(0, |caller| steps[caller]);
+            if let Some(caller) = caller {
+                steps[caller] += 1;
+            }
+            let text = call.text.and_then(|text| texts.get(text as usize));
             self.push(Row {
                 episode_index,
                 call_id: position as i64,
-                caller_id: (!is_root).then_some(0),
-                depth: i64::from(!is_root),
-                step: position.saturating_sub(1) as i64,
-                program: (*program).into(),
+                caller_id: caller.map(|caller| caller as i64),
+                depth: i64::from(call.depth),
+                step,
+                program: text.map_or(ROOT, String::as_str).into(),
                 argument_slot: None,
                 argument: None,
                 input_begin: 0,
@@ -105,7 +125,7 @@ impl Rows {
                 output_end: Some(end),
                 frame_begin: begin,
                 frame_end: end,
-                end_of_program: !is_root && position + 1 == calls.len(),
+                end_of_program: caller.is_some_and(|caller| last[caller] == Some(position)),
                 instruction: None,
             });
         }

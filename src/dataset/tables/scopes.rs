@@ -4,7 +4,6 @@ pub(crate) mod check;
 
 use std::iter::repeat_n;
 
-use crate::dataset::tables::annotated::AnnotatedCall;
 use crate::dataset::tables::view::{CallSpans, EpisodeView};
 use crate::table::table;
 use crate::trace::{ProgramCall, ScopingLabel, Span};
@@ -46,15 +45,6 @@ impl Rows {
         let n_after = self.call_id.len();
         self.episode_index.resize(n_after, episode_index);
         n_after - before
-    }
-
-    /// Adds the labels of an episode that was annotated elsewhere, whose calls see all its frames.
-    pub(crate) fn append_annotated(&mut self, calls: &[AnnotatedCall<'_>], episode_index: i64, n_frames: i64) {
-        let input = Span { begin: 0, end: u32::try_from(n_frames).unwrap_or(u32::MAX) };
-        for (call_id, call) in calls.iter().enumerate() {
-            self.append_call(call_id as i64, input, call.frames);
-        }
-        self.episode_index.resize(self.call_id.len(), episode_index);
     }
 
     /// Adds the labels of a call for the frames of its input, but for the number of its episode.

@@ -1,14 +1,17 @@
-//! Checks a dataset whose programs were annotated elsewhere: a root, and below it runs of frames.
+//! Checks a dataset whose programs were annotated elsewhere: a root, and below it labels, which may lie in others.
 //!
 //! Its programs are texts and its observations are anyone's, so that the rules of our own programs and worlds do not
 //! hold; counts, order, spans, labels and texts do.
 
 use std::path::Path;
 
+use crate::artifact::read_json;
 use crate::dataset::DatasetError;
 use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::finding::Validation;
+use crate::dataset::files::info::NtpInfo;
 use crate::dataset::files::layout;
+use crate::dataset::plain::LabelsForm;
 use crate::dataset::tables::annotated::ROOT;
 use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
@@ -27,7 +30,6 @@ batch! {
         episode_index,
         frame_index,
         timestamp,
-        task_index,
         subtask_index,
         call_id,
         program,
@@ -37,6 +39,9 @@ batch! {
 /// Checks the episodes.
 pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> Result<(), DatasetError> {
     let (info, rows) = EpisodeRows::open(root)?;
+    let ntp: NtpInfo = read_json(&root.join(layout::NTP_INFO))?;
+    // Beside labels of another form they count texts of their own.
+    let texts = (texts, ntp.annotated_by.as_deref() == Some(LabelsForm::SubtaskIndex.name()));
     let mut calls = Cursor::<CallFactsBatch>::new(root, layout::CALLS);
     let mut frames = Cursor::<FrameBatch>::new(root, layout::DATA);
     let mut labels = Cursor::<ScopeBatch>::new(root, layout::SCOPES);
@@ -45,14 +50,18 @@ pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> 
         validation.episodes += 1;
         let tree = read_calls(&mut calls, &row, validation)?;
         check_frames(&mut frames, &row, &tree, (texts, info.fps), validation)?;
-        scopes::check(&mut labels, &row, tree.iter().map(labelled), validation)?;
+        // Where there are none, spans alone tell them.
+        if row.n_scopes > 0 {
+            scopes::check(&mut labels, &row, tree.iter().map(labelled), validation)?;
+        }
     }
     calls.finish()?;
     frames.finish()?;
     labels.finish()
 }
 
-/// Reads the calls of an episode and holds the rules of a tree of two levels.
+/// Reads the calls of an episode and holds the rules of their tree: a root over all frames, callers before callees, each
+/// within its caller and behind those before it.
 fn read_calls(
     cursor: &mut Cursor<CallFactsBatch>,
     row: &EpisodeRow,
@@ -60,19 +69,25 @@ fn read_calls(
 ) -> Result<Vec<CallFacts>, DatasetError> {
     let calls = read_call_facts(cursor, row)?;
     let whole = [0, u32::try_from(row.n_frames).unwrap_or(u32::MAX)];
-    let mut before = 0;
+    // By call, where its last callee ended.
+    let mut ends = vec![0; calls.len()];
     for call in &calls {
         let [begin, end] = call.frames;
-        let is_in_place = if call.call_id == 0 {
-            (call.frames, call.caller_id, call.depth) == (whole, None, 0) && call.program == ROOT
-        } else {
-            let lies_behind = before <= begin && begin < end && end <= whole[1];
-            before = end;
-            lies_behind && (call.caller_id, call.depth) == (Some(0), 1)
+        let caller =
+            call.caller_id.and_then(|caller| calls.get(caller as usize)).filter(|of| of.call_id < call.call_id);
+        let is_in_place = match caller {
+            None => {
+                (call.call_id, call.frames, call.caller_id, call.depth) == (0, whole, None, 0) && call.program == ROOT
+            }
+            Some(caller) => {
+                let before = std::mem::replace(&mut ends[caller.call_id as usize], end);
+                let lies_behind = before.max(caller.frames[0]) <= begin && begin < end && end <= caller.frames[1];
+                lies_behind && call.depth == caller.depth + 1
+            }
         };
         if !(is_in_place && call.input == whole && call.output == Some(call.frames)) {
             let problem = format!(
-                "frames {:?}, caller or spans are not those of a root and its sub-tasks in order",
+                "frames {:?}, caller or spans are not those of a root and what it calls in order",
                 (begin, end)
             );
             let (path, call) = (cursor.path(), call.call_id);
@@ -83,19 +98,55 @@ fn read_calls(
     Ok(calls)
 }
 
+/// The deepest call that runs at a frame, and that of the first level: callers come before callees.
+struct Running<'c> {
+    calls: &'c [CallFacts],
+    /// The first call that has not begun.
+    next: usize,
+}
+
+impl Running<'_> {
+    fn at(&mut self, frame: i64) -> usize {
+        while self.calls.get(self.next).is_some_and(|call| i64::from(call.frames[0]) <= frame) {
+            self.next += 1;
+        }
+        let last = self.next.saturating_sub(1);
+        callers(self.calls, last).find(|&at| frame < i64::from(self.calls[at].frames[1])).unwrap_or(0)
+    }
+}
+
+/// A call, its caller, and so on to the root.
+fn callers(calls: &[CallFacts], call: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(Some(call).filter(|&at| at < calls.len()), |&at| {
+        calls[at].caller_id.map(|caller| caller as usize).filter(|&caller| caller < at)
+    })
+}
+
+/// The names of the running programs, the root first.
+fn path_of(calls: &[CallFacts], call: usize) -> String {
+    let mut names: Vec<&str> = callers(calls, call).map(|at| calls[at].program.as_str()).collect();
+    names.reverse();
+    names.join("/")
+}
+
 fn check_frames(
     cursor: &mut Cursor<FrameBatch>,
     row: &EpisodeRow,
     calls: &[CallFacts],
-    (texts, fps): (&Texts, u32),
+    ((texts, has_numbers), fps): ((&Texts, bool), f64),
     validation: &mut Validation,
 ) -> Result<(), DatasetError> {
-    let mut next = 1;
+    let mut running = Running { calls, next: 1 };
+    let mut known = (usize::MAX, String::new(), None);
+    let numbers = |number: i64, text: Option<&str>| {
+        if has_numbers { texts.named_subtask_problem(number, text) } else { None }
+    };
     for frame in 0..row.n_frames {
-        while calls.get(next).is_some_and(|call| i64::from(call.frames[1]) <= frame) {
-            next += 1;
+        let deepest = running.at(frame);
+        if known.0 != deepest {
+            let first = callers(calls, deepest).find(|&at| calls[at].depth == 1);
+            known = (deepest, path_of(calls, deepest), first.map(|at| calls[at].program.as_str()));
         }
-        let running = calls.get(next).filter(|call| i64::from(call.frames[0]) <= frame);
         let (batch, at) = cursor.next(row.data)?;
         let found = [batch.index[at], batch.episode_index[at], batch.frame_index[at]];
         let expected = [row.first_index + frame, row.episode_index, frame];
@@ -104,13 +155,11 @@ fn check_frames(
             return Err(cursor.problem(format!("{names} are {found:?}, but should be {expected:?}")));
         }
         validation.frames += 1;
-        let call_id = if running.is_some() { next as i64 } else { 0 };
-        let text = running.map(|call| call.program.as_str());
+        let label = (batch.call_id[at], batch.program.row(at));
         let problems = [
             time_problem(batch.timestamp[at], frame, fps),
-            label_problem((batch.call_id[at], batch.program.row(at)), call_id, text),
-            texts.task_problem(batch.task_index[at], &row.task_text).map(|problem| ("frames.task", problem)),
-            texts.named_subtask_problem(batch.subtask_index[at], text).map(|problem| ("frames.task", problem)),
+            label_problem(label, deepest as i64, &known.1),
+            numbers(batch.subtask_index[at], known.2).map(|problem| ("frames.task", problem)),
         ];
         for (code, problem) in problems.into_iter().flatten() {
             let place = format!("episode {}, frame {frame}", row.episode_index);
@@ -120,15 +169,14 @@ fn check_frames(
     Ok(())
 }
 
-fn time_problem(timestamp: f32, frame: i64, fps: u32) -> Option<(&'static str, String)> {
-    let expected = frame as f64 / f64::from(fps.max(1));
+fn time_problem(timestamp: f32, frame: i64, fps: f64) -> Option<(&'static str, String)> {
+    let expected = frame as f64 / fps;
     let is_near = (f64::from(timestamp) - expected).abs() <= TOLERANCE_SECS;
     (!is_near).then(|| ("frames.time", format!("timestamp is {timestamp}, but should be {expected}")))
 }
 
-fn label_problem(found: (i64, &str), call_id: i64, text: Option<&str>) -> Option<(&'static str, String)> {
-    let path = text.map_or(ROOT.to_owned(), |text| format!("{ROOT}/{text}"));
-    let expected = (call_id, path.as_str());
+fn label_problem(found: (i64, &str), call_id: i64, path: &str) -> Option<(&'static str, String)> {
+    let expected = (call_id, path);
     (found != expected).then(|| {
         ("frames.label", format!("(ntp.call_id, ntp.program) are {found:?}, but the calls make them {expected:?}"))
     })

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize as _;
 
 use crate::artifact::{IoError, read_json};
+use crate::dataset::DatasetError;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::info::{Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
@@ -13,7 +14,6 @@ use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::dataset::statistics::FeatureStatistics;
 use crate::dataset::tables::frames::feature::{FEATURES, Feature, known};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};
-use crate::dataset::{DatasetError, EpisodePictures};
 use crate::program::KnownPrograms;
 use crate::table::{Columns, TableError, TableReader};
 
@@ -35,7 +35,7 @@ pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
 }
 
 /// A dataset that was published has a card, and nobody may use what has no licence.
-fn check_card(root: &Path, validation: &mut Validation) {
+pub(super) fn check_card(root: &Path, validation: &mut Validation) {
     let path = root.join(layout::CARD);
     let card = match std::fs::read(&path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return,
@@ -75,16 +75,6 @@ fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validati
             }
             Some(_) => {}
         }
-    }
-    let known: BTreeSet<_> = known().map(|feature| feature.name).collect();
-    let is_picture = |name: &&str| declared.get(name).is_some_and(|of| matches!(of.dtype, Dtype::Image | Dtype::Video));
-    for name in declared.keys().filter(|name| !known.contains(*name) && !is_picture(name)) {
-        validation.warn(
-            "info.features",
-            &path,
-            (*name).to_owned(),
-            "declared, but no feature of this version".to_owned(),
-        );
     }
 }
 
@@ -225,14 +215,17 @@ pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &
     let listed: BTreeSet<PathBuf> = data.iter().map(|place| place.in_dataset(root, layout::DATA)).collect();
     let mut found = Vec::new();
     files_below(&root.join(layout::DATA), &mut found, validation);
-    for path in found.iter().filter(|path| !listed.contains(*path)) {
+    let is_table = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "parquet");
+    for path in found.iter().filter(is_table).filter(|path| !listed.contains(*path)) {
         let message = "no episode is in this file, but readers that take all files of the folder would read it";
         validation.error("file.unlisted", path, String::new(), message.to_owned());
     }
-    let images = match EpisodePictures::features(root) {
-        Ok(images) => images,
-        Err(error) => return validation.failed_once("file.undeclared", &error),
+    let info: Info = match read_json(&root.join(layout::INFO)) {
+        Ok(info) => info,
+        Err(error) => return validation.failed_once("file.undeclared", &DatasetError::from(error)),
     };
+    let columns = info.features.0.iter().filter(|(_, feature)| feature.dtype != Dtype::Video);
+    let declared: BTreeSet<&str> = columns.map(|(name, _)| name.as_str()).collect();
     for path in &listed {
         let reader = match TableReader::open_columns(path, &FRAMES, &["index"]) {
             Ok(reader) => reader,
@@ -241,11 +234,16 @@ pub(super) fn check_files(root: &Path, data: &BTreeSet<FilePlace>, validation: &
                 continue;
             }
         };
-        let is_known =
-            |name: &&str| known().any(|feature| feature.name == *name) || images.iter().any(|image| image == name);
-        if let Some(name) = reader.file_columns().find(|name| !is_known(name)) {
+        let there: BTreeSet<&str> = reader.file_columns().collect();
+        if let Some(name) = there.difference(&declared).next() {
             let message = format!("column {name:?} is not declared in {}", layout::INFO);
             validation.error("file.undeclared", path, String::new(), message);
+        }
+        // Columns of ours that are missing are found when frames are read.
+        let is_other = |name: &&&str| !known().any(|feature| feature.name == **name);
+        if let Some(name) = declared.difference(&there).find(is_other) {
+            let message = format!("no column {name:?}, which is declared: readers take nothing for it");
+            validation.error("frames.missing", path, String::new(), message);
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::Info;
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::tables::annotated::FAMILY as ANNOTATED;
 use crate::dataset::tables::{episodes, meta_episodes};
 use crate::table::{Batch as _, Columns, TableError, TableReader, TextRows, batch};
 
@@ -169,7 +170,10 @@ impl EpisodeRows {
         let found = (meta.episode_index[at], meta.length[at], meta.to_index[at]);
         let expected = (row.episode_index, row.n_frames, row.first_index + row.n_frames);
         row.copies_problem = meta.copies_problem(at, &row);
-        let tasks_agree = meta.tasks[at].len() == 1 && meta.tasks[at][0] == row.task_text;
+        let tasks = &meta.tasks[at];
+        // Episodes of others may have several tasks, of which the first is the episode's here.
+        let is_single = tasks.len() == 1 || row.family == ANNOTATED;
+        let tasks_agree = is_single && tasks.first().is_some_and(|task| *task == row.task_text);
         if found != expected {
             return Err(self.meta.problem(format!(
                 "(episode_index, length, dataset_to_index) are {found:?}, but {} makes them {expected:?}",
