@@ -226,8 +226,12 @@ impl Tables {
         write_subtasks(root, self.frames.subtasks())?;
         let tasks = self.tasks.texts().len() as u64;
         let totals = Totals { episodes: self.n_episodes, frames: self.n_frames, tasks };
-        let mut info =
-            Info::new(totals, declared(&self.slots, config.action), f64::from(config.fps.get()), config.file_megabytes.get());
+        let mut info = Info::new(
+            totals,
+            declared(&self.slots, config.action),
+            f64::from(config.fps.get()),
+            config.file_megabytes.get(),
+        );
         info.features.0.extend(self.frames.declared_further(&self.slots));
         info.features.0.extend(self.pictures.declared());
         if self.frames.has_joints() {
