@@ -185,7 +185,6 @@ fn write_own(
     let mut target = Target::create(folder, first)?;
     let mut descriptions = Vec::new();
     let mut seen = Seen::default();
-    let roots: Vec<PathBuf> = sources.iter().map(|source| source.root().to_owned()).collect();
     let failed_left_out = sources.iter().map(|source| source.ntp.failed_left_out).sum();
     let path = first.root().to_owned();
     for mut source in sources {

@@ -18,9 +18,13 @@ pub(super) enum Origin {
         /// By which column.
         column: String,
     },
-<<<<<<< HEAD
     /// A trained model took demonstrations apart.
     Modelled(Modelled),
+    /// A dataset of others as it is, without program tables.
+    Foreign {
+        /// Forms of labels that it has.
+        labels: Vec<&'static str>,
+    },
 }
 
 /// What `ntp/annotation.json` tells of labels that models made.
@@ -34,13 +38,6 @@ pub(super) struct Modelled {
     measured: String,
     /// What is told of doubtful episodes.
     doubtful: String,
-=======
-    /// A dataset of others as it is, without program tables.
-    Foreign {
-        /// Forms of labels that it has.
-        labels: Vec<&'static str>,
-    },
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
 }
 
 /// The part of `ntp/info.json` that tells.
@@ -126,13 +123,10 @@ impl Origin {
                 &["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning", "synthetic"]
             }
             Self::Annotated { .. } => &["LeRobot", "robotics", "hierarchical", "imitation-learning"],
-<<<<<<< HEAD
             Self::Modelled(_) => {
                 &["LeRobot", "robotics", "neural-task-programming", "hierarchical", "imitation-learning"]
             }
-=======
             Self::Foreign { .. } => &["LeRobot", "robotics", "imitation-learning"],
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -165,12 +159,10 @@ impl Origin {
                 "{total_episodes} robot episodes of {total_tasks} tasks, with their annotated sub-tasks as a program tree \
                  of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
             ),
-<<<<<<< HEAD
             Self::Modelled(Modelled { models, .. }) => format!(
                 "{total_episodes} robot episodes of {total_tasks} tasks, taken apart by the model {models} into a \
                  hierarchy of program calls with arguments, spans and confidences."
             ),
-=======
             Self::Foreign { .. } => {
                 let robot = summary.declared.as_ref().and_then(|declared| declared.robot_type.as_deref());
                 let robot = robot.map_or_else(String::new, |robot| format!(", robot type {robot:?}"));
@@ -179,7 +171,6 @@ impl Origin {
                     "{total_episodes} robot episodes of {total_tasks} tasks: {frames} frames at {fps} a second{robot}."
                 )
             }
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -195,11 +186,10 @@ impl Origin {
                  it. These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
                  how, or how exactly."
             ),
-<<<<<<< HEAD
             Self::Modelled(Modelled { models, day, measured, doubtful }) => format!(
                 "These labels are predictions: the model {models} made them of the demonstrations{day}. Nobody has drawn \
                  or checked them by hand. {measured} `calls.confidence` tells how sure each call is{doubtful}."
-=======
+            ),
             Self::Foreign { labels } if labels.is_empty() => {
                 "Beside the tasks in words it has no labels: frames are not told apart by what is being done.".to_owned()
             }
@@ -207,7 +197,6 @@ impl Origin {
                 "It has labels below the task ({}), as they were annotated elsewhere. The files do not tell who \
                  annotated them, how, or how exactly.",
                 labels.join(", ")
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
             ),
         }
     }
@@ -222,14 +211,11 @@ impl Origin {
                 "Episodes, videos and statistics are those of the dataset that it was brought in from. Its files do not \
                  tell whether a robot or a simulation acted."
             }
-<<<<<<< HEAD
             Self::Modelled(_) => {
                 "Episodes, videos and observations are those of the dataset that was annotated; who acted is in \
                  `episodes.actor`, as far as it was known."
             }
-=======
             Self::Foreign { .. } => "The files do not tell who acted, nor whether on a robot or in a simulation.",
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -259,14 +245,10 @@ impl Origin {
                 let share = 100.0 * successes as f64 / all.max(1) as f64;
                 format!("{successes} of {all} episodes succeeded ({share:.1} %).")
             }
-<<<<<<< HEAD
             Self::Annotated { .. } | Self::Modelled(_) => {
                 "Demonstrations are taken for successes: nobody has judged them.".to_owned()
             }
-=======
-            Self::Annotated { .. } => "Demonstrations are taken for successes: nobody has judged them.".to_owned(),
             Self::Foreign { .. } => "The files do not tell which episodes succeeded.".to_owned(),
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -287,18 +269,16 @@ impl Origin {
                 "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
                 format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
             ],
-<<<<<<< HEAD
             Self::Modelled(Modelled { measured, .. }) => vec![
                 format!("The labels are a model's. {measured}"),
                 format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
                 "Observations are positions of slots, relative to the gripper.".to_owned(),
-=======
+            ],
             Self::Foreign { .. } => vec![
                 format!(
                     "`timestamp` is regular at {fps} frames a second, as LeRobot wants: when a sensor was read is not told."
                 ),
                 "What its columns mean is told by their names alone.".to_owned(),
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
             ],
         };
         let boundaries =
@@ -320,14 +300,10 @@ impl Origin {
     pub(super) fn default_creator(&self) -> &'static str {
         match self {
             Self::Simulated => "The ntp project",
-<<<<<<< HEAD
             Self::Annotated { .. } | Self::Modelled(_) => {
                 "Unknown: the authors of the dataset that it was brought in from"
             }
-=======
-            Self::Annotated { .. } => "Unknown: the authors of the dataset that it was brought in from",
             Self::Foreign { .. } => "Unknown: whoever recorded it",
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -336,11 +312,8 @@ impl Origin {
         match self {
             Self::Simulated => "ntp convert PIPELINE.toml",
             Self::Annotated { .. } => "ntp dataset import THEIRS",
-<<<<<<< HEAD
             Self::Modelled(_) => "ntp annotate DEMONSTRATIONS --model MODEL",
-=======
             Self::Foreign { .. } => "",
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 
@@ -354,14 +327,11 @@ impl Origin {
             Self::Annotated { .. } => {
                 "`ntp/episodes.parquet` names the file that each episode was read from, by name and hash."
             }
-<<<<<<< HEAD
             Self::Modelled(_) => {
                 "`ntp/annotation.json` names the models, and `ntp/episodes.parquet` what each episode was read from, by \
                  name and hash."
             }
-=======
             Self::Foreign { .. } => "",
->>>>>>> 0365e11 (dataset: any LeRobotDataset is a dataset, with labels of every form in and out)
         }
     }
 }

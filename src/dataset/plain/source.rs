@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::artifact::read_json;
 use crate::dataset::DatasetError;
+use crate::dataset::files::info::BY_MODEL;
 use crate::dataset::files::layout;
 use crate::dataset::files::pointer::pointer_problem;
 use crate::dataset::plain::declared::PlainInfo;
@@ -17,9 +18,9 @@ use crate::table::BatchReader;
 pub(crate) enum ProgramTables {
     /// None.
     None,
-    /// Those of labels that were annotated elsewhere, or by a model.
+    /// Those of labels that were annotated elsewhere: programs are texts.
     Annotated,
-    /// Those of a program of ours that acted.
+    /// Those of programs of ours, that acted or that a model found.
     Own,
 }
 
@@ -27,7 +28,7 @@ pub(crate) enum ProgramTables {
 pub(crate) fn program_tables(root: &Path) -> ProgramTables {
     let path = root.join(layout::NTP_INFO);
     match read_json::<serde_json::Value>(&path) {
-        Ok(info) if info["annotated_by"].is_string() => ProgramTables::Annotated,
+        Ok(info) if info["annotated_by"].as_str().is_some_and(|by| by != BY_MODEL) => ProgramTables::Annotated,
         // What cannot be read is found by whoever reads it.
         _ if path.is_file() => ProgramTables::Own,
         _ => ProgramTables::None,

@@ -75,7 +75,7 @@ struct ModelFrames {
 
 impl ModelFrames {
     fn new(root: &Path, info: &Info) -> Self {
-        let (cursor, fps) = (Cursor::new(root, layout::DATA), f64::from(info.fps.max(1)));
+        let (cursor, fps) = (Cursor::new(root, layout::DATA), info.fps);
         Self { cursor, fps, paths: ProgramPaths::default(), path_texts: TextTable::default() }
     }
 
