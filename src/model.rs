@@ -67,7 +67,6 @@ pub use detector::{
     detector_of,
 };
 pub(crate) use detector::{loss as detection_loss, loss_and_distance, positions_in_world};
-pub(crate) use device::is_processor;
 pub use device::{ComputeDevice, DeviceError, NoDevice};
 pub use encoder::{ArgumentDecoder, Encoder, TrainingDefaults, Widths};
 pub use encoder_kind::EncoderKind;

@@ -260,7 +260,7 @@ impl NetworkUse for Learning<'_, '_> {
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
         let source = if model.variant.sees() { source } else { source.without_pictures() };
         let (specification, scoping) = (model.network.specification(), network.scoping());
-        let run = Run { config, source, facts, specification, scoping, grain, model, folder, seed };
+        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, seed };
         let (network, trained) = run.train(network, hooks)?;
         write(folder, model, on, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;
@@ -282,13 +282,13 @@ impl NetworkUse for Learning<'_, '_> {
         };
         let (detector, programmer) = network.into_parts();
         let hash = facts.hash.clone();
-        let detecting = DetectorRun { config, data, hash, gallery, model, folder, seed };
+        let detecting = DetectorRun { on, config, data, hash, gallery, model, folder, seed };
         let (detector, standing) = detecting.train(detector, hooks)?;
         let detected = detector::detected(&detector, data, gallery)?;
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
         let (specification, scoping) = (SpecificationForm::Trajectories, programmer.scoping());
         let (source, facts) = (Source::Here(&detected, None), &facts_of(&detected)?);
-        let run = Run { config, source, facts, specification, scoping, grain, model, folder, seed };
+        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, seed };
         let (programmer, trained) = run.train(programmer, hooks)?;
         detector_metrics::write(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
         let network = Detecting::new(detector, programmer, data.n_slots);

@@ -215,6 +215,16 @@ mod tests {
     }
 
     #[test]
+    fn it_is_the_same_by_burns_own_as_accelerators_compute_it() {
+        let (weight, bias) = (wave([3 * 3 * 4, 5], 0.7), wave([5], 1.3));
+        let layer = Convolution::new(Param::from_tensor(weight), Param::from_tensor(bias), [3, 2, 1]);
+        let pictures: Tensor<4> = wave([6, 9, 7, 4], 0.11);
+        let [own, burns] = [layer.forward(pictures.clone()), layer.forward_elsewhere(pictures)];
+        assert_eq!((own.dims(), burns.dims()), ([6, 5, 4, 5], [6, 5, 4, 5]));
+        own.into_data().assert_approx_eq::<f32>(&burns.into_data(), Tolerance::rel_abs(1e-5, 1e-5));
+    }
+
+    #[test]
     fn any_number_of_threads_gives_the_same_bits() {
         let pass = || ours(wave([40, 3, 32, 32], 0.11), wave([8, 3, 3, 3], 0.7), wave([8], 1.3), [3, 1, 1]);
         let with = |n_threads| {

@@ -23,6 +23,8 @@ pub enum ComputeDevice {
     /// The processor. Its numbers are the same with any number of threads.
     #[default]
     Cpu,
+    /// The processor, learning as an accelerator does: a step is one batch. For tests.
+    CpuBatched,
     /// A graphics card behind Vulkan, Metal or DirectX, by its number among the cards of this machine.
     Wgpu(u32),
     /// What the system has in place of a graphics card: the same programs, drawn by the processor. For tests.
@@ -33,7 +35,9 @@ pub enum ComputeDevice {
 
 /// Words that are no device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{found:?} is no device; allowed: cpu, wgpu, wgpu:N, wgpu:cpu, cuda, cuda:N, with N the card's number from 0")]
+#[error(
+    "{found:?} is no device; allowed: cpu, cpu:batched, wgpu, wgpu:N, wgpu:cpu, cuda, cuda:N, with N the card's number from 0"
+)]
 pub struct NoDevice {
     /// As typed.
     pub found: String,
@@ -71,6 +75,7 @@ impl FromStr for ComputeDevice {
         let number = || card.map_or(Ok(0), |card| card.parse().map_err(|_no_number| no_device()));
         match (kind, card) {
             ("cpu", None) => Ok(Self::Cpu),
+            ("cpu", Some("batched")) => Ok(Self::CpuBatched),
             ("wgpu", Some("cpu")) => Ok(Self::WgpuSoftware),
             ("wgpu", _) => Ok(Self::Wgpu(number()?)),
             ("cuda", _) => Ok(Self::Cuda(number()?)),
@@ -83,6 +88,7 @@ impl fmt::Display for ComputeDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Cpu => f.write_str("cpu"),
+            Self::CpuBatched => f.write_str("cpu:batched"),
             Self::Wgpu(card) => write!(f, "wgpu:{card}"),
             Self::WgpuSoftware => f.write_str("wgpu:cpu"),
             Self::Cuda(card) => write!(f, "cuda:{card}"),
@@ -98,14 +104,14 @@ impl ComputeDevice {
     /// [`DeviceError`] when it is not built in, or not there.
     pub fn open(self) -> Result<Device, DeviceError> {
         match self {
-            Self::Cpu => Ok(Device::flex()),
+            Self::Cpu | Self::CpuBatched => Ok(Device::flex()),
             Self::Wgpu(card) => wgpu(self, Some(card)),
             Self::WgpuSoftware => wgpu(self, None),
             Self::Cuda(card) => cuda(self, card),
         }
     }
 
-    /// Whether it is the processor, where every number is the same with any number of threads.
+    /// Whether it is the processor as always, where every number is the same with any number of threads.
     pub fn is_cpu(self) -> bool {
         self == Self::Cpu
     }
@@ -169,6 +175,7 @@ mod tests {
     fn a_device_is_read_as_it_is_written() {
         for (words, device) in [
             ("cpu", ComputeDevice::Cpu),
+            ("cpu:batched", ComputeDevice::CpuBatched),
             ("wgpu", ComputeDevice::Wgpu(0)),
             ("wgpu:2", ComputeDevice::Wgpu(2)),
             ("wgpu:cpu", ComputeDevice::WgpuSoftware),

@@ -100,6 +100,7 @@ impl Costs {
     }
 
     /// What a unit took in all, if all of its shards were measured under this plan.
+    #[cfg_attr(not(feature = "report"), expect(dead_code, reason = "the report alone asks for it"))]
     pub(super) fn of(&self, unit: &str, plan: &Plan) -> Option<UnitCost> {
         let plan_id = plan.id();
         let own = self.whole.units.get(unit).filter(|cost| cost.plan_id == plan_id).cloned();

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::{DatasetTrials, Wanted};
 use crate::model::{
-    Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, loss_and_distance,
+    ComputeDevice, Detector, ModelConfig, PictureSample, Pictures, detected_rows, detection_loss, loss_and_distance,
     positions_in_world, scalar,
 };
 use crate::seed::Seed;
@@ -56,6 +56,7 @@ impl Stands for DetectorStanding {
 pub(super) struct DetectorRun<'r> {
     pub(super) config: &'r TrainConfig,
     pub(super) data: &'r DatasetTrials,
+    pub(super) on: ComputeDevice,
     /// Of the data.
     pub(super) hash: String,
     pub(super) gallery: &'r dyn Gallery,
@@ -84,7 +85,7 @@ impl DetectorRun<'_> {
         }
         let checkpoints = Checkpoints::of_detector(self.folder, self.model, self.hash.clone());
         let device = detector.device();
-        let fresh = Learner::new(detector, device, self.config.clip_norm);
+        let fresh = Learner::new(detector, device, self.config.clip_norm, !self.on.is_cpu());
         let (mut learner, mut standing) = match checkpoints.resume(fresh)? {
             Ok(Resumed { learner, standing }) => (learner, standing),
             Err(learner) => (self.calibrated(learner)?, DetectorStanding::default()),
@@ -138,9 +139,9 @@ impl DetectorRun<'_> {
         let learning_rate = self.config.detector_learning_rate_at(standing.step);
         let step = standing.step + 1;
         let pictures = groups.iter().map(|shown| shown.pictures.n as u32).sum();
-        let Stepped { learner, losses: [loss, distance_m], dropped } = match learner.is_on_processor() {
-            true => learn_by_group(learner, &groups, learning_rate, step)?,
-            false => learn_at_once(learner, groups, learning_rate, step)?,
+        let Stepped { learner, losses: [loss, distance_m], dropped } = match learner.learns_at_once() {
+            true => learn_at_once(learner, groups, learning_rate, step)?,
+            false => learn_by_group(learner, &groups, learning_rate, step)?,
         };
         standing.step = step;
         standing.dropped_gradients += u32::from(dropped);

@@ -14,7 +14,7 @@ use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Device, Tensor, TensorData};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use crate::model::{ModelError, Network, ReadError, TensorError, is_processor, scalar, values};
+use crate::model::{ModelError, Network, ReadError, TensorError, scalar, values};
 use crate::trace::ScopingLabel;
 use crate::training::TrainError;
 use crate::training::adam::Adam;
@@ -62,6 +62,8 @@ pub struct Learner<M> {
     /// All parameters as one vector, where they are not on the processor; nothing before the first step.
     flat: Option<Tensor<1>>,
     clip_norm: f32,
+    /// Whether a step is one batch.
+    at_once: bool,
 }
 
 /// What comes of a step.
@@ -75,9 +77,9 @@ pub struct Stepped<M, L> {
 }
 
 impl<M: Module + Sync> Learner<M> {
-    /// Begins with a module on a device with gradients.
-    pub fn new(module: M, device: Device, clip_norm: f32) -> Self {
-        Self { module, device, optimizer: Adam::default(), flat: None, clip_norm }
+    /// Begins with a module on a device with gradients; learns group by group unless `at_once`.
+    pub fn new(module: M, device: Device, clip_norm: f32, at_once: bool) -> Self {
+        Self { module, device, optimizer: Adam::default(), flat: None, clip_norm, at_once }
     }
 
     /// The module as it is now.
@@ -85,9 +87,9 @@ impl<M: Module + Sync> Learner<M> {
         &self.module
     }
 
-    /// Whether it learns on the processor, where groups run side by side.
-    pub(super) fn is_on_processor(&self) -> bool {
-        is_processor(&self.device)
+    /// Whether a step is one batch, and not group by group.
+    pub(super) fn learns_at_once(&self) -> bool {
+        self.at_once
     }
 
     /// The same with other parameters.
@@ -147,13 +149,13 @@ impl<M: Module + Sync> Learner<M> {
             sum.iter_mut().zip(gradient).for_each(|(sum, part)| *sum += part);
         }
         let dropped = !clip(&mut sum, self.clip_norm);
-        let Self { module, device, mut optimizer, flat, clip_norm } = self;
+        let Self { module, device, mut optimizer, flat, clip_norm, at_once } = self;
         let (n, host) = (sum.len(), device.clone().without_autodiff());
         let gradient = Tensor::from_data(TensorData::new(sum, [n]), &host);
         let parameters = Tensor::from_data(TensorData::new(host_parameters(&module)?, [n]), &host);
         let parameters = optimizer.step(learning_rate, parameters, gradient);
         let module = module.map(&mut FromHost { values: &values(parameters)? });
-        let learner = Self { module, device, optimizer, flat, clip_norm };
+        let learner = Self { module, device, optimizer, flat, clip_norm, at_once };
         Ok(Stepped { learner, losses: results.into_iter().map(|(losses, _)| losses).collect(), dropped })
     }
 
@@ -186,7 +188,7 @@ impl<M: Module + Sync> Learner<M> {
             Some(scale) => gradient.mul_scalar(scale),
             None => gradient,
         };
-        let Self { module, device, mut optimizer, flat, clip_norm } = self;
+        let Self { module, device, mut optimizer, flat, clip_norm, at_once } = self;
         let parameters = flat.unwrap_or_else(|| {
             let mut parts = Parameters(Vec::new());
             module.visit(&mut parts);
@@ -194,7 +196,7 @@ impl<M: Module + Sync> Learner<M> {
         });
         let parameters = optimizer.step(learning_rate, parameters, gradient);
         let module = module.map(&mut FromFlat { flat: parameters.clone(), begin: 0 });
-        let learner = Self { module, device, optimizer, flat: Some(parameters), clip_norm };
+        let learner = Self { module, device, optimizer, flat: Some(parameters), clip_norm, at_once };
         Ok(Stepped { learner, losses, dropped })
     }
 }

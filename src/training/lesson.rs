@@ -74,10 +74,9 @@ impl Lesson<'_> {
         self.announce(standing.step + 1);
         let step = standing.step + 1;
         let names: Vec<&'static str> = chosen.iter().map(|&level| levels[level].0.name()).collect();
-        let Stepped { learner, losses, dropped } = if learner.is_on_processor() {
-            self.learn_by_group(learner, &groups, chosen.len(), step)?
-        } else {
-            self.learn_at_once(learner, &groups, &names, step)?
+        let Stepped { learner, losses, dropped } = match learner.learns_at_once() {
+            true => self.learn_at_once(learner, &groups, &names, step)?,
+            false => self.learn_by_group(learner, &groups, chosen.len(), step)?,
         };
         standing.step = step;
         standing.dropped_gradients += u32::from(dropped);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::model::{ModelConfig, Network, ScopingKind};
+use crate::model::{ComputeDevice, ModelConfig, Network, ScopingKind};
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
 use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
@@ -12,6 +12,7 @@ use crate::training::{Examples, Grain, Hooks, Learner, TrainConfig, TrainError, 
 
 /// A training with everything settled but its network.
 pub(super) struct Run<'r> {
+    pub(super) on: ComputeDevice,
     pub(super) config: &'r TrainConfig,
     pub(super) source: Source<'r>,
     pub(super) facts: &'r Facts,
@@ -44,7 +45,7 @@ impl Run<'_> {
     pub(super) fn train<N: Network>(&self, network: N, hooks: &mut Hooks<'_>) -> Result<(N, Trained), TrainError> {
         let checkpoints = self.checkpoints();
         let device = network.device();
-        let fresh = Learner::new(network, device, self.config.clip_norm);
+        let fresh = Learner::new(network, device, self.config.clip_norm, !self.on.is_cpu());
         let mut standing_at = checkpoints.resume(fresh)?;
         let resumed_at = standing_at.as_ref().map_or(0, |resumed: &Resumed<N, Standing>| resumed.standing.step);
         let mut held = Held::of(self.source);

@@ -111,12 +111,8 @@ fn models(run: &Path) -> Vec<PathBuf> {
     models
 }
 
-#[test]
-fn every_variant_learns_on_wgpu_what_it_learns_on_the_processor() {
-    let Some(program) = with_wgpu() else {
-        tell("skipped: this program was built without wgpu, and NTP_WGPU names none that was");
-        return;
-    };
+/// Trains every variant on the processor, and then again by a program on a device; what differs.
+fn differences(program: &Path, device: &str) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let (pipeline, out) = (written(folder.path()), folder.path().join("run"));
     let out_word = out.to_string_lossy().into_owned();
@@ -126,13 +122,13 @@ fn every_variant_learns_on_wgpu_what_it_learns_on_the_processor() {
         models(&out).into_iter().map(|model| (model.clone(), losses(&model))).collect();
     assert_eq!(before.len(), VARIANTS.len() + 1);
     let mut command = Command::new(program);
-    command.args(["train", &pipeline, "--out", &out_word, "--device", "wgpu:cpu", "--force"]);
-    let status = command.current_dir(repository()).status().unwrap();
-    assert!(status.success(), "{status}");
+    command.args(["train", &pipeline, "--out", &out_word, "--device", device, "--force"]);
+    let output = command.current_dir(repository()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let mut wrong = Vec::new();
     for (model, on_processor) in before {
         let config = std::fs::read_to_string(model.join("config.json")).unwrap();
-        assert!(config.contains(r#""trained_on": "wgpu:cpu""#), "{config}");
+        assert!(config.contains(&format!(r#""trained_on": "{device}""#)), "{config}");
         let (name, there) = (model.file_name().unwrap().to_string_lossy().into_owned(), losses(&model));
         assert_eq!(there.len(), on_processor.len(), "{name}");
         for (at, ((what, here), (_, there))) in on_processor.into_iter().zip(there).enumerate() {
@@ -145,6 +141,22 @@ fn every_variant_learns_on_wgpu_what_it_learns_on_the_processor() {
             }
         }
     }
+    wrong
+}
+
+#[test]
+fn a_step_that_is_one_batch_learns_in_every_variant_what_its_groups_learn_one_by_one() {
+    let wrong = differences(Path::new(env!("CARGO_BIN_EXE_ntp")), "cpu:batched");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_variant_learns_on_wgpu_what_it_learns_on_the_processor() {
+    let Some(program) = with_wgpu() else {
+        tell("skipped: this program was built without wgpu, and NTP_WGPU names none that was");
+        return;
+    };
+    let wrong = differences(&program, "wgpu:cpu");
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -167,7 +179,7 @@ fn a_device_that_is_none_is_refused_with_what_is_allowed() {
         let (code, _, stderr) = run(&[command, smoke::PIPELINE, "--device", "gpu"]);
         assert_eq!(code, 2, "{stderr}");
         assert!(
-            stderr.contains(r#""gpu" is no device; allowed: cpu, wgpu, wgpu:N, wgpu:cpu, cuda, cuda:N"#),
+            stderr.contains(r#""gpu" is no device; allowed: cpu, cpu:batched, wgpu, wgpu:N, wgpu:cpu, cuda, cuda:N"#),
             "{stderr}"
         );
     }
