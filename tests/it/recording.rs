@@ -196,3 +196,40 @@ fn a_writer_that_is_dropped_leaves_nothing() {
     drop(writer);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// Other angles at each frame, a zero with a sign among them.
+fn with_joints(episode: Episode) -> Episode {
+    let mut parts = episode.into_parts();
+    for (number, frame) in parts.frames.iter_mut().enumerate() {
+        let angle = |joint: usize| number as f32 * 0.01 - joint as f32 * 0.3;
+        frame.state.joints_rad = Some(std::array::from_fn(|joint| if joint == 6 { -0.0 } else { angle(joint) }));
+    }
+    Episode::new(parts).unwrap()
+}
+
+#[test]
+fn joints_come_back_bit_for_bit() {
+    let episodes: Vec<Episode> = stacking_episodes(3).into_iter().map(with_joints).collect();
+    let recording = Recording::of(&episodes);
+    let found = read(&recording.path()).unwrap();
+    assert_eq!(found, episodes);
+    let bits = |episodes: &[Episode]| -> Vec<u32> {
+        let frames = episodes.iter().flat_map(|episode| &episode.frames);
+        frames.flat_map(|frame| frame.state.joints_rad.unwrap().map(f32::to_bits)).collect()
+    };
+    assert_eq!(bits(&found), bits(&episodes));
+}
+
+#[test]
+fn a_recording_is_of_robots_with_joints_or_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let [without, with] = [stacking_episodes(2).remove(0), with_joints(stacking_episodes(2).remove(1))];
+    let mut writer = ShardWriter::create(&folder.path().join("shard.mcap"), PLAN).unwrap();
+    writer.write(&without).unwrap();
+    let refused = writer.write(&with).unwrap_err().to_string();
+    assert!(refused.contains("its robot has joints and those of the file's others have none"), "{refused}");
+    let mut parts = with.into_parts();
+    parts.frames[1].state.joints_rad = None;
+    let refused = Episode::new(parts).unwrap_err().to_string();
+    assert_eq!(refused, "frame 1: it tells joints and the first frame does not, or the other way round");
+}
