@@ -30,7 +30,7 @@ pub(crate) fn program_tables(root: &Path) -> ProgramTables {
     match read_json::<serde_json::Value>(&path) {
         Ok(info) if info["annotated_by"].as_str().is_some_and(|by| by != BY_MODEL) => ProgramTables::Annotated,
         // What cannot be read is found by whoever reads it.
-        _ if path.is_file() => ProgramTables::Own,
+        _ if path.parent().is_some_and(Path::is_dir) => ProgramTables::Own,
         _ => ProgramTables::None,
     }
 }
