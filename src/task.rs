@@ -104,8 +104,8 @@ pub struct Task {
     pub conditions: Vec<Condition>,
     /// Whether it may be trained on.
     pub split: Split,
-    /// Block Stacking: only the first so many blocks are within reach, 2 to 7; the others stand aside. `None`: all of
-    /// them, and in families without blocks.
+    /// Families of blocks: only the first so many are within reach, from 2; the others stand aside. `None`: all of them, and in
+    /// families without blocks.
     pub blocks: Option<u16>,
 }
 
@@ -143,6 +143,12 @@ impl Task {
         let bodies = |slot| self.family.kind(slot).map(|kind| kind.bodies);
         let is_bowl = |goal: &&Goal| bodies(goal.source) == Some(Bodies::OneIfAsked);
         self.goals.iter().filter(is_bowl).count() as u16
+    }
+
+    /// Things of the tallest tower; 0 in families that build none.
+    pub fn tallest(&self) -> u16 {
+        let towers = if self.family.builds_towers() { order::towers(&self.goals) } else { Vec::new() };
+        towers.iter().map(|tower| tower.len() as u16 + 1).max().unwrap_or(0)
     }
 
     /// The task in a sentence.

@@ -76,7 +76,7 @@ struct TaskEntry {
     goals: Vec<Goal<String>>,
     /// What must hold in the end.
     conditions: Vec<Condition<String>>,
-    /// Block Stacking: only the first so many blocks, 2 to 7, are within reach; left out when all eight are.
+    /// Families of blocks: only the first so many, from 2, are within reach; left out when all are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     blocks: Option<u16>,
 }

@@ -24,7 +24,7 @@ impl Task {
 }
 
 /// Goals by tower, in the order in which towers are begun. A goal belongs to the tower whose top or bottom it builds on.
-fn towers(goals: &[Goal]) -> Vec<Vec<Goal>> {
+pub(super) fn towers(goals: &[Goal]) -> Vec<Vec<Goal>> {
     let mut towers: Vec<Vec<Goal>> = Vec::new();
     for &goal in goals {
         let own = towers.iter_mut().find(|tower| tower.iter().any(|below| below.source == goal.target));

@@ -95,7 +95,7 @@ pub enum TaskSetError {
     #[error(
         "tasks[{task}].blocks: is {blocks}; allowed in {} is {}",
         family.name(),
-        if family.max_blocks().is_some() { "2 to 7, or none for all eight" } else { "none" }
+        family.max_blocks().map_or("none".to_owned(), |most| format!("2 to {}, or none for all {most}", most - 1))
     )]
     Blocks {
         /// Which task.

@@ -353,7 +353,7 @@ fn a_set_made_in_memory_keeps_the_same_rules() {
         let error = TaskSet { family, tasks: vec![task] }.validate().unwrap_err();
         assert_eq!(error.to_string(), expected);
     };
-    let allowed = "allowed in block_stacking is 2 to 7, or none for all eight";
+    let allowed = "allowed in block_stacking is 2 to 7, or none for all 8";
     blocks(8, Family::BlockStacking, &format!("tasks[0].blocks: is 8; {allowed}"));
     blocks(1, Family::BlockStacking, &format!("tasks[0].blocks: is 1; {allowed}"));
     blocks(4, Family::ObjectSorting, "tasks[0].blocks: is 4; allowed in object_sorting is none");

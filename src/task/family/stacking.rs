@@ -25,10 +25,11 @@ use std::collections::BTreeSet;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::geometry::{Pose, Vec3, horizontal_distance, upright};
+use crate::geometry::{Pose, upright};
 use crate::program::Program;
-use crate::scene::{Body, Mobility, Scene, Shape, Slot, SlotIndex};
+use crate::scene::{Scene, SlotIndex};
 use crate::seed::Seed;
+use crate::task::family::blocks;
 use crate::task::family::spec::{Bench, Bodies, FamilySpec, FrontView, Room, Sampler, SlotKind};
 use crate::task::{Condition, Family, Goal, Split, Task, TaskPool};
 
@@ -56,7 +57,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
         all_seen: None,
         sample,
     },
-    scene,
+    scene: |counts| blocks::scene(&BLOCK_NAMES, &BLOCK_COLORS, counts),
     poses,
     bench: BENCH,
 };
@@ -71,22 +72,8 @@ const BENCH: Bench = Bench {
 /// How many blocks there are, left out or not.
 const N_BLOCKS: u16 = 8;
 
-/// Edge of a stacking block.
-const BLOCK_M: f32 = 0.05;
-/// Distance between the cells of the 4x4 grid that blocks start on.
-const BLOCK_PITCH_M: f32 = 0.1;
-/// How far a block may start from its cell's middle, in x and in y.
-const BLOCK_JITTER_M: f32 = 0.03;
-/// Least distance between two blocks' centres at the start: fingers must fit between neighbours.
-const BLOCK_SPACING_M: f32 = 0.08;
-/// Positions that are tried for a block before all are scattered anew: its neighbours may leave it no room.
-const MAX_TRIES: usize = 64;
-/// Scatterings that are tried before blocks start in the middles of their cells.
-const MAX_LAYOUTS: usize = 1000;
-/// Where blocks stand aside, from the table's middle, in x and in y, and their distance: in the corner that is below
-/// the picture of the camera in front and behind that of the camera on the gripper.
-const ASIDE_CORNER_M: f32 = -0.57;
-const ASIDE_PITCH_M: f32 = 0.06;
+/// Cells a side of the grid that blocks start on.
+const SIDE: usize = 4;
 
 const BLOCK_NAMES: [&str; N_BLOCKS as usize] =
     ["block_A", "block_B", "block_C", "block_D", "block_E", "block_F", "block_G", "block_H"];
@@ -101,59 +88,9 @@ const BLOCK_COLORS: [[u8; 3]; N_BLOCKS as usize] = [
     [236, 120, 180],
 ];
 
-/// The scene for 1 or 0 of each block (0 when it stands aside); what is left out is 1.
-fn scene(counts: &[u16]) -> Scene {
-    let is_aside = |block: usize| counts.get(block).is_some_and(|&count| count == 0);
-    let body = |(block, &color): (usize, &[u8; 3])| Body {
-        name: BLOCK_NAMES[block].to_owned(),
-        shape: Shape::Cuboid { half_extents_m: [BLOCK_M / 2.0; 3] },
-        mobility: if is_aside(block) { Mobility::Fixed } else { Mobility::Movable },
-        color,
-    };
-    let bodies: Vec<Body> = BLOCK_COLORS.iter().enumerate().map(body).collect();
-    let slots = bodies.iter().enumerate().map(|(block, body)| Slot::single(body.name.clone(), block)).collect();
-    Scene { bodies, slots, table_half_m: [0.6, 0.6] }
-}
-
-/// Random positions of the blocks within reach, then those of the blocks that stand aside.
+/// Random poses of the blocks.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
-    let n_movable = scene.bodies.iter().filter(|body| body.mobility == Mobility::Movable).count();
-    let mut cells: Vec<(usize, usize)> = (0..16).map(|cell| (cell % 4, cell / 4)).collect();
-    let scattered = (0..MAX_LAYOUTS).find_map(|_| {
-        cells.shuffle(rng);
-        scatter_blocks(&cells[..n_movable], rng)
-    });
-    let scattered = scattered.unwrap_or_else(|| cells.iter().take(n_movable).map(|&cell| cell_middle(cell)).collect());
-    let aside = (n_movable..scene.bodies.len()).map(aside);
-    scattered.into_iter().chain(aside).map(|position| upright(position, 0.0)).collect()
-}
-
-/// Where a block stands that a task leaves out: two columns in the corner, counted from the last block.
-fn aside(block: usize) -> Vec3 {
-    let place = usize::from(N_BLOCKS - 1).saturating_sub(block);
-    let [x, y] = [place % 2, place / 2].map(|step| step as f32 * ASIDE_PITCH_M);
-    Vec3::new(ASIDE_CORNER_M + x, ASIDE_CORNER_M + y, BLOCK_M / 2.0)
-}
-
-/// The middle of a cell of the grid that blocks start on.
-fn cell_middle((column, row): (usize, usize)) -> Vec3 {
-    let middle = |cell: usize| (cell as f32 - 1.5) * BLOCK_PITCH_M;
-    Vec3::new(middle(column), middle(row), BLOCK_M / 2.0)
-}
-
-/// One block a cell; nothing when the blocks before leave no room in a cell.
-fn scatter_blocks(cells: &[(usize, usize)], rng: &mut impl rand::Rng) -> Option<Vec<Vec3>> {
-    let mut positions: Vec<Vec3> = Vec::new();
-    for &cell in cells {
-        let free = (0..MAX_TRIES).find_map(|_| {
-            let mut jitter = || rng.random_range(-BLOCK_JITTER_M..BLOCK_JITTER_M);
-            let position = cell_middle(cell) + Vec3::new(jitter(), jitter(), 0.0);
-            let apart = |other: &Vec3| horizontal_distance(other, &position) >= BLOCK_SPACING_M;
-            positions.iter().all(apart).then_some(position)
-        });
-        positions.push(free?);
-    }
-    Some(positions)
+    blocks::positions(scene, SIDE, rng).into_iter().map(|position| upright(position, 0.0)).collect()
 }
 
 /// The heights of a task's towers, and how many of 2000 tasks have them.
