@@ -13,6 +13,7 @@ mod episode;
 mod frame;
 mod instruction;
 mod lanes;
+mod noise;
 mod observation_rows;
 mod outcome;
 mod push;
@@ -30,6 +31,7 @@ pub use instruction::{
     Instruction, InstructionError, MAX_WORDS, Vocabulary, Words, instruction_spans, instructions, sentence,
 };
 pub use lanes::calls_by_depth;
+pub use noise::{NoiseError, ObservationNoise};
 pub use observation_rows::{ObservationRow, ObservationRowMut, ObservationRows};
 pub use outcome::{Cause, Outcome};
 pub use push::Push;
