@@ -88,14 +88,14 @@ impl Driver {
         let config = model::load_config(folder)?;
         let path = folder.to_owned();
         let (found, expected) = (config.family, demonstration.provenance.family);
-        if found != expected {
+        if !config.acts(expected) {
             return Err(DeployError::Family { path, found, expected });
         }
         if config.network.pixels().is_some() {
             return Err(DeployError::Sees { path, variant: config.variant.to_string() });
         }
         let (found, expected) = (config.n_slots, demonstration.scene.slots.len());
-        if found != expected {
+        if !config.reads_slots(expected) {
             return Err(DeployError::Slots { path, found, expected });
         }
         let (config, policy) = load_policy_on(&device.open()?, folder, Decoder::default())?;

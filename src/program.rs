@@ -61,6 +61,9 @@ impl Program {
         Self::Kitting,
     ];
 
+    /// The root that stands for all where the roots of all families are one program.
+    pub const ANY_ROOT: Self = Self::BlockStacking;
+
     /// The name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
@@ -112,6 +115,11 @@ impl Program {
     /// Whether it calls other programs.
     pub fn is_composite(self) -> bool {
         !self.is_primitive() && self != Self::None
+    }
+
+    /// Whether it is the root of a family's call trees.
+    pub fn is_root(self) -> bool {
+        self.is_composite() && self.n_slots() == 0
     }
 
     /// How many slots it is about: what is moved and where to, where a call has to name them both.

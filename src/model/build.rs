@@ -55,7 +55,8 @@ pub fn with_network<U: NetworkUse>(
     device: &Device,
     wanted: U,
 ) -> Result<U::Output, ConfigError> {
-    build(config, &mut Init::new(seed, device).knowing(config.programs()), wanted)
+    let mut init = Init::new(seed, device).knowing(config.programs()).sharing_root(config.shared_root);
+    build(config, &mut init, wanted)
 }
 
 /// The same with parameters from anywhere.

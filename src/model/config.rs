@@ -22,6 +22,11 @@ use crate::trace::SpecificationForm;
 /// Colours for letters, shadows and darker sides.
 const SPARE_COLOURS: usize = 3;
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_off(setting: &bool) -> bool {
+    !setting
+}
+
 /// The widths of a network, by its encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -220,12 +225,18 @@ pub struct ModelConfig {
     pub version: u32,
     /// The kind of network.
     pub variant: Variant,
-    /// The family of tasks that it was trained on.
+    /// The family of tasks that it was trained on; of several the first.
     pub family: Family,
-    /// Slots of the scenes that it was trained on.
+    /// The families that it was trained on besides.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_families: Vec<Family>,
+    /// Slots of the scenes that it was trained on; of several families the most.
     pub n_slots: usize,
-    /// Hash of the programs that it knows: those of its family.
+    /// Hash of the programs that it knows: those of its families.
     pub vocabulary: String,
+    /// Whether the roots of all families are one program to it, so that it can be asked for a family that it has not seen.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub shared_root: bool,
     /// The tasks that it knows by name, where it knows any: those of [`ScopingKind::Arguments`], in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<String>,
@@ -259,8 +270,10 @@ impl ModelConfig {
             version: Self::VERSION,
             variant,
             family,
+            other_families: Vec::new(),
             n_slots,
             vocabulary: family.programs().hash(),
+            shared_root: false,
             tasks: Vec::new(),
             network: NetworkConfig::of(variant, specification),
             training,
@@ -274,19 +287,59 @@ impl ModelConfig {
         Self { trained_on: (!device.is_cpu()).then(|| device.to_string()), ..self }
     }
 
+    /// The same for other families besides.
+    #[must_use]
+    pub fn beside(self, other_families: Vec<Family>) -> Self {
+        let known = other_families.iter().map(|family| family.programs()).fold(self.programs(), KnownPrograms::max);
+        Self { vocabulary: known.hash(), other_families, ..self }
+    }
+
+    /// The families that it was trained on.
+    pub fn families(&self) -> impl Iterator<Item = Family> {
+        std::iter::once(self.family).chain(self.other_families.iter().copied())
+    }
+
+    /// The same by name.
+    pub(crate) fn family_names(&self) -> String {
+        self.families().map(Family::name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Whether it can be asked for tasks of a family: it knows the root program, or takes all roots for one.
+    pub fn acts(&self, family: Family) -> bool {
+        self.shared_root || self.families().any(|own| own.root_program() == family.root_program())
+    }
+
+    /// Whether it reads scenes of so many slots: as many as it was trained on; fewer where it was trained on fewer, too; any
+    /// number where slots are read one by one.
+    pub fn reads_slots(&self, n_slots: usize) -> bool {
+        match self.network {
+            NetworkConfig::ObjectCentric(_) => {
+                self.variant.scoping() != ScopingKind::Arguments || n_slots == self.n_slots
+            }
+            NetworkConfig::Flattened(_) => self.families().any(|own| own.n_slots() == n_slots),
+            _ => n_slots == self.n_slots,
+        }
+    }
+
     /// Whether a network can be made of it.
     ///
     /// # Errors
     ///
     /// [`ConfigError`] for the first key that makes no sense, with what is allowed.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let Self { version: _, variant, family: _, n_slots, vocabulary: _, tasks, network, training: _, trained_on: _ } =
+        let Self { version: _, variant, family: _, other_families, n_slots, vocabulary: _, shared_root, tasks, .. } =
             self;
+        let Self { network, training: _, trained_on: _, .. } = self;
         check_sizes(&[("n_slots", *n_slots)])?;
         ConfigError::unless(network.is_for(*variant), "network", network.name(), "widths of the variant's encoder")?;
         let knows_tasks = variant.scoping() == ScopingKind::Arguments;
         let allowed = "none but for scoping arguments, which knows tasks by name";
         ConfigError::unless(knows_tasks || tasks.is_empty(), "tasks", tasks.len(), allowed)?;
+        let reads_any =
+            matches!(network, NetworkConfig::ObjectCentric(_) | NetworkConfig::Flattened(_)) && !knows_tasks;
+        let allowed = "none but for networks that read positions and a specification";
+        ConfigError::unless(reads_any || other_families.is_empty(), "other_families", other_families.len(), allowed)?;
+        ConfigError::unless(reads_any || !shared_root, "shared_root", "on", allowed)?;
         let reads_vectors =
             variant.scoping() != ScopingKind::Arguments && !matches!(network, NetworkConfig::Convolved(_));
         let allowed = "off but for vectors of positions beside a specification";

@@ -55,19 +55,23 @@ pub(crate) fn agents(rows: &ObservationRows) -> Vec<f32> {
     rows.iter().flat_map(|row| row.gripper.iter().copied()).collect()
 }
 
-/// All slots side by side, and behind them with `relations` each pair's displacement: `[rows, flat_width(N)]`.
-pub(crate) fn flat(rows: &ObservationRows, relations: bool) -> Vec<f32> {
-    let mut features = Vec::with_capacity(rows.len() * flat_width(rows.n_slots(), relations));
-    for row in rows.iter() {
+/// All slots side by side, and behind them with `relations` each pair's displacement: `[rows, flat_width(n_slots)]`. Slots
+/// that the rows do not have are zeros, which no position is.
+pub(crate) fn flat(rows: &ObservationRows, n_slots: usize, relations: bool) -> Vec<f32> {
+    let width = flat_width(n_slots, relations);
+    let mut features = Vec::with_capacity(rows.len() * width);
+    for (number, row) in rows.iter().enumerate() {
         for position in row.positions {
             features.extend(position_features(*position, FLAT_HEIGHT_GAIN));
         }
+        features.resize(number * width + POSITION_WIDTH * n_slots, 0.0);
         features.extend_from_slice(row.gripper);
         for (after, a) in row.positions.iter().enumerate().filter(|_| relations) {
             for b in &row.positions[..after] {
                 features.extend(position_features([a[0] - b[0], a[1] - b[1], a[2] - b[2]], FLAT_HEIGHT_GAIN));
             }
         }
+        features.resize((number + 1) * width, 0.0);
     }
     features
 }
@@ -108,13 +112,24 @@ mod tests {
 
     #[test]
     fn relations_stand_behind_what_is_read_without_them() {
-        let (plain, related) = (flat(&row(), false), flat(&row(), true));
+        let (plain, related) = (flat(&row(), 2, false), flat(&row(), 2, true));
         assert_eq!((plain.len(), related.len()), (flat_width(2, false), flat_width(2, true)));
         assert_eq!((flat_width(8, false), flat_width(8, true)), (50, 218));
         assert_eq!(related[..plain.len()], plain);
         let [x, y, z, bump_x, bump_y, bump_z] = related[plain.len()..] else { panic!("{related:?}") };
         assert_eq!([x, y, bump_x, bump_y], [0.0, 0.0, 1.0, 1.0]);
         assert!((z + 1.0).abs() < 1e-5 && (bump_z - (-1.0_f32).exp()).abs() < 1e-5, "the upper one is 5 cm above");
+    }
+
+    #[test]
+    fn slots_that_are_not_there_are_zeros() {
+        let (own, padded) = (flat(&row(), 2, true), flat(&row(), 3, true));
+        assert_eq!(padded.len(), flat_width(3, true));
+        assert_eq!(padded[..12], own[..12], "both slots");
+        assert_eq!(padded[12..18], [0.0; 6], "the third");
+        assert_eq!(padded[18..20], own[12..14], "the gripper");
+        assert_eq!(padded[20..26], own[14..], "the one pair");
+        assert_eq!(padded[26..], [0.0; 12], "the pairs of the third");
     }
 
     #[test]

@@ -72,6 +72,8 @@ pub struct FlatDemonstration {
     /// `[B, T, features]`
     frames: Tensor<3>,
     padding: Option<Padding>,
+    /// Slots of its scene: at most as many as the network is made for.
+    n_slots: usize,
 }
 
 /// Demonstration and state, encoded.
@@ -97,7 +99,7 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
         let &FlattenedConfig { width, scope_kernel, .. } = V::widths(config);
         let n_features = V::width(config, n_slots);
         Self {
-            vectors: V::new(config, init),
+            vectors: V::new(config, n_slots, init),
             state: init.mlp(&[n_features, width, width]),
             specification: SpecificationEncoder::new(init, n_features, width, scope_kernel),
         }
@@ -115,12 +117,12 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
     fn demonstration(&self, windows: &Windows, percepts: &V::Percepts) -> Result<FlatDemonstration, ReadError> {
         let device = self.device();
         let frames = self.vectors.of_windows(windows, percepts, &device)?;
-        Ok(FlatDemonstration { frames, padding: windows.padding(&device) })
+        Ok(FlatDemonstration { frames, padding: windows.padding(&device), n_slots: windows.n_slots() })
     }
 
     fn window(demonstration: &FlatDemonstration, span: Span) -> FlatDemonstration {
         let frames = demonstration.frames.clone().narrow(1, span.begin as usize, span.len());
-        FlatDemonstration { frames, padding: None }
+        FlatDemonstration { frames, padding: None, n_slots: demonstration.n_slots }
     }
 
     fn read(
@@ -129,7 +131,7 @@ impl<V: Vectors> Encoder for FlatEncoder<V> {
         states: &States,
         percepts: &V::Percepts,
     ) -> Result<FlatReading, ReadError> {
-        let FlatDemonstration { frames, padding } = demonstration;
+        let FlatDemonstration { frames, padding, .. } = demonstration;
         let state = self.state.forward(self.vectors.of_states(states, percepts, &self.device())?);
         let (convolved, summary) = self.specification.forward(frames.clone(), padding.as_ref());
         Ok(FlatReading { demonstration: demonstration.clone(), convolved, summary, state })
@@ -163,8 +165,9 @@ impl<V: Vectors> ArgumentDecoder<FlatEncoder<V>> for FlatArgument {
     }
 
     fn forward(&self, reading: &FlatReading, program: Tensor<2>, view: Tensor<2>, _hidden: Tensor<2>) -> Tensor<2> {
-        let FlatDemonstration { frames, padding } = &reading.demonstration;
+        let FlatDemonstration { frames, padding, n_slots } = &reading.demonstration;
         let (_, summary) = self.specification.forward(frames.clone(), padding.as_ref());
-        self.slots.forward(self.hidden.forward(Tensor::cat(vec![summary, program, view], 1)))
+        let logits = self.slots.forward(self.hidden.forward(Tensor::cat(vec![summary, program, view], 1)));
+        if logits.dims()[1] > *n_slots { logits.narrow(1, 0, *n_slots) } else { logits }
     }
 }

@@ -19,6 +19,7 @@ use crate::seed::Seed;
 /// another process.
 pub struct Init {
     known: KnownPrograms,
+    shared_root: bool,
     /// What they are drawn from; `None` where they only have shapes, to be filled from a file.
     rng: Option<ChaCha8Rng>,
     next_id: u64,
@@ -33,7 +34,7 @@ impl Init {
     /// Parameters of which nothing is made until a file fills them: whatever sizes it claims, they cost nothing before
     /// its tensors are known to have them.
     pub(crate) fn unfilled(device: &Device) -> Self {
-        Self { known: KnownPrograms::FIRST, rng: None, next_id: 1, device: device.clone() }
+        Self { known: KnownPrograms::FIRST, shared_root: false, rng: None, next_id: 1, device: device.clone() }
     }
 
     /// For a network that knows these programs.
@@ -44,6 +45,16 @@ impl Init {
     /// The programs that the network shall know.
     pub(crate) fn known(&self) -> KnownPrograms {
         self.known
+    }
+
+    /// For a network in which the roots of all families are one program.
+    pub(crate) fn sharing_root(self, shared_root: bool) -> Self {
+        Self { shared_root, ..self }
+    }
+
+    /// Whether the roots of all families are one program.
+    pub(crate) fn shares_root(&self) -> bool {
+        self.shared_root
     }
 
     /// Uniform in `-bound..bound`.

@@ -21,17 +21,24 @@ pub struct ProgramMemory {
     programs: Param<Tensor<2>>,
     /// `[programs, key]`
     keys: Param<Tensor<2>>,
+    /// Whether the roots of all families are one program.
+    #[module(skip)]
+    shared_root: bool,
 }
 
 impl ProgramMemory {
     pub(crate) fn new(init: &mut Init, width: usize) -> Self {
         let n_programs = init.known().count();
-        Self { programs: init.parameter([n_programs, width], 0.5), keys: init.parameter([n_programs, width], 0.5) }
+        Self {
+            programs: init.parameter([n_programs, width], 0.5),
+            keys: init.parameter([n_programs, width], 0.5),
+            shared_root: init.shares_root(),
+        }
     }
 
     /// A memory of given rows.
     pub fn from_rows(programs: Tensor<2>, keys: Tensor<2>) -> Self {
-        Self { programs: Param::from_tensor(programs), keys: Param::from_tensor(keys) }
+        Self { programs: Param::from_tensor(programs), keys: Param::from_tensor(keys), shared_root: false }
     }
 
     /// The embedding of a program.
@@ -40,7 +47,12 @@ impl ProgramMemory {
     ///
     /// `[1, embedding]`
     pub fn embedding(&self, program: Program) -> Tensor<2> {
-        self.programs.val().narrow(0, program.index(), 1)
+        self.programs.val().narrow(0, self.row(program).index(), 1)
+    }
+
+    /// The program whose row a running program is read from.
+    fn row(&self, program: Program) -> Program {
+        if self.shared_root && program.is_root() { Program::ANY_ROOT } else { program }
     }
 
     /// The embeddings of the running programs of `n_rows` decisions, a row each.
@@ -53,7 +65,8 @@ impl ProgramMemory {
             RunningPrograms::One(program) => repeat_row(self.embedding(program), n_rows),
             RunningPrograms::Each(programs) => {
                 let all = self.programs.val();
-                Tensor::<2>::from_data(one_hot(programs, all.dims()[0]), &all.device()).matmul(all)
+                let programs: Vec<Program> = programs.iter().map(|&program| self.row(program)).collect();
+                Tensor::<2>::from_data(one_hot(&programs, all.dims()[0]), &all.device()).matmul(all)
             }
         }
     }

@@ -186,11 +186,13 @@ pub fn load_config(folder: &Path) -> Result<ModelConfig, ModelError> {
 ///
 /// [`ModelError::Purpose`] for the first field that differs.
 pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) -> Result<(), ModelError> {
+    let family = if config.acts(wanted.family) { wanted.family.name().to_owned() } else { config.family_names() };
+    let n_slots = if config.reads_slots(wanted.n_slots) { wanted.n_slots } else { config.n_slots };
     let fields = [
         ("variant", config.variant.to_string(), wanted.variant.to_string()),
-        ("family", config.family.name().to_owned(), wanted.family.name().to_owned()),
+        ("family", family, wanted.family.name().to_owned()),
         ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
-        ("n_slots", config.n_slots.to_string(), wanted.n_slots.to_string()),
+        ("n_slots", n_slots.to_string(), wanted.n_slots.to_string()),
         ("pictures", pixels(config), pixels(wanted)),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
@@ -219,7 +221,8 @@ pub fn load<U: NetworkUse>(
     let path = folder.join(WEIGHTS_FILE);
     let bytes = artifact::read(&path)?;
     let loading = Loading { bytes, path: &path, wanted };
-    build(config, &mut Init::unfilled(device).knowing(config.programs()), loading)
+    let mut init = Init::unfilled(device).knowing(config.programs()).sharing_root(config.shared_root);
+    build(config, &mut init, loading)
         .unwrap_or_else(|problem| Err(ModelError::Config { problem, path: folder.join(CONFIG_FILE) }))
 }
 

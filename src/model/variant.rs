@@ -114,6 +114,12 @@ pub enum VariantError {
 }
 
 impl Variant {
+    /// Whether one network of it can be trained on several families: it reads positions, and what to do from a specification.
+    pub fn reads_any_family(self) -> bool {
+        matches!(self.encoder, EncoderKind::ObjectCentric | EncoderKind::Flattened)
+            && self.scoping != ScopingKind::Arguments
+    }
+
     /// The variant of these parts.
     ///
     /// # Errors

@@ -59,8 +59,8 @@ pub trait Vectors: Module + ModuleDisplay + Sync + Sized + 'static {
     /// See [`super::Network::Percepts`].
     type Percepts: Clone + Send + Sync;
 
-    /// Fresh ones.
-    fn new(config: &Self::Config, init: &mut Init) -> Self;
+    /// Fresh ones for scenes of `n_slots` slots.
+    fn new(config: &Self::Config, n_slots: usize, init: &mut Init) -> Self;
 
     /// Widths of the encoder above.
     fn widths(config: &Self::Config) -> &FlattenedConfig;
@@ -87,9 +87,11 @@ pub trait Vectors: Module + ModuleDisplay + Sync + Sized + 'static {
     fn of_states(&self, states: &States, percepts: &Self::Percepts, device: &Device) -> Result<Tensor<2>, ReadError>;
 }
 
-/// All slots' positions side by side, and where asked for the displacements between them.
+/// All slots' positions side by side, and where asked for the displacements between them. Of a scene with fewer slots than
+/// the network is made for, the others are zeros.
 #[derive(Module, Debug)]
 pub struct Positions {
+    n_slots: usize,
     relations: bool,
 }
 
@@ -104,8 +106,8 @@ impl Vectors for Positions {
     type Config = FlattenedConfig;
     type Percepts = ();
 
-    fn new(config: &FlattenedConfig, _init: &mut Init) -> Self {
-        Self { relations: config.relations }
+    fn new(config: &FlattenedConfig, n_slots: usize, _init: &mut Init) -> Self {
+        Self { n_slots, relations: config.relations }
     }
 
     fn widths(config: &FlattenedConfig) -> &FlattenedConfig {
@@ -119,15 +121,15 @@ impl Vectors for Positions {
     fn perceive(&self, _pictures: &Pictures) {}
 
     fn of_windows(&self, windows: &Windows, (): &(), device: &Device) -> Result<Tensor<3>, ReadError> {
-        let shape = [windows.n_windows(), windows.n_frames(), flat_width(windows.n_slots(), self.relations)];
-        let features = features::flat(windows.observations()?, self.relations);
+        let shape = [windows.n_windows(), windows.n_frames(), flat_width(self.n_slots, self.relations)];
+        let features = features::flat(windows.observations()?, self.n_slots, self.relations);
         Ok(Tensor::from_data(TensorData::new(features, shape), device))
     }
 
     fn of_states(&self, states: &States, (): &(), device: &Device) -> Result<Tensor<2>, ReadError> {
         let rows = states.observations()?;
-        let shape = [rows.len(), flat_width(rows.n_slots(), self.relations)];
-        Ok(Tensor::from_data(TensorData::new(features::flat(rows, self.relations), shape), device))
+        let shape = [rows.len(), flat_width(self.n_slots, self.relations)];
+        Ok(Tensor::from_data(TensorData::new(features::flat(rows, self.n_slots, self.relations), shape), device))
     }
 }
 
@@ -179,7 +181,7 @@ impl Vectors for Convolved {
     type Config = ConvolvedConfig;
     type Percepts = Tensor<2>;
 
-    fn new(config: &ConvolvedConfig, init: &mut Init) -> Self {
+    fn new(config: &ConvolvedConfig, _n_slots: usize, init: &mut Init) -> Self {
         let (mut layers, mut channels, mut pixels) = (Vec::new(), 3, config.pixels);
         for (n_channels, stride) in LAYERS {
             layers.push(init.conv([channels, n_channels], [3, stride, 1]));

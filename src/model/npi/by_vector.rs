@@ -41,7 +41,7 @@ impl CallEncoder for ByVector {
     fn read(&self, states: &ObservationRows, called_with: &[CalledWith]) -> Tensor<2> {
         let device = self.device();
         let (n_batch, n_slots) = (called_with.len(), self.n_slots());
-        let states = TensorData::new(features::flat(states, false), [n_batch, flat_width(n_slots, false)]);
+        let states = TensorData::new(features::flat(states, n_slots, false), [n_batch, flat_width(n_slots, false)]);
         let flags = TensorData::new(flags(called_with, n_slots), [n_batch, MAX_ARGUMENTS * n_slots]);
         self.state.forward(Tensor::cat(vec![Tensor::from_data(states, &device), Tensor::from_data(flags, &device)], 1))
     }
