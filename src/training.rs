@@ -158,6 +158,9 @@ pub fn train_from(
     let training = training.resolved();
     let facts = source.facts()?;
     let model = model(&training, &facts, size, folder)?;
+    if !on.is_cpu() {
+        facts.check_one_family(&format!("{} on {on}", training.variant))?;
+    }
     let device = on.open()?.autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
     let learning = Learning { on, config: &training.config, source, facts: &facts, model: &model, folder, seed, hooks };
@@ -175,7 +178,12 @@ fn model(
     let n_slots = facts.n_slots;
     let written =
         serde_json::to_value(training).map_err(|source| IoError::Json { path: folder.join(CONFIG_FILE), source })?;
-    let mut model = ModelConfig::new(*variant, training.specification, facts.family, n_slots, written);
+    if !(variant.reads_any_family() && training.specification == SpecificationForm::Trajectories) {
+        facts.check_one_family(&format!("{variant} with {}", training.specification))?;
+    }
+    let (family, other_families) = facts.first_family()?;
+    let mut model = ModelConfig::new(*variant, training.specification, family, n_slots, written);
+    model = ModelConfig { shared_root: config.shared_root, ..model.beside(other_families) };
     if variant.scoping() == ScopingKind::Arguments {
         model.tasks.clone_from(&facts.task_ids);
     }

@@ -10,7 +10,7 @@ use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
 use crate::seed::Seed;
 use crate::task::Family;
-use crate::trace::{ObservationRow, ObservationRowMut};
+use crate::trace::{ObservationNoise, ObservationRow, ObservationRowMut};
 use crate::training::augment::containers::{Aside, Merge};
 use crate::training::config::TrainConfig;
 use crate::training::examples::Example;
@@ -57,6 +57,16 @@ impl Views {
             let called_with = self.example.called_with.arguments.iter_mut().flatten();
             self.example.arguments.iter_mut().chain(called_with).for_each(|slot| *slot = label(&order, *slot));
         }
+        let seed = Seed(u64::from(scattered.to_bits()) << 32 | u64::from(relabelled.to_bits()));
+        self.put_off(config.noise, seed);
+    }
+
+    /// Puts all positions off, apart in demonstration and state.
+    fn put_off(&mut self, noise: ObservationNoise, seed: Seed) {
+        let [demonstration, world] = ["demonstration", "world"].map(|part| seed.derive(part, &[]));
+        let frames = self.window.iter_mut().enumerate();
+        frames.for_each(|(frame, row)| noise.put_off(row.positions, frame as u64, demonstration));
+        self.state.iter_mut().for_each(|row| noise.put_off(row.positions, self.example.frame as u64, world));
     }
 
     /// The observations that are read: those of the window, where it has some, and what is seen now.

@@ -15,7 +15,7 @@ use crate::training::TrainError;
 use crate::training::augment::Views;
 use crate::training::config::TrainConfig;
 use crate::training::examples::{Example, Examples};
-use crate::training::recovery;
+use crate::training::recovery::{self, Moment};
 
 /// Frames in a mini-batch from which on it is split in two parts of about the same length of windows: less padding,
 /// and a part for each of two cores. A fixed number, since the sum of gradients must not depend on the machine.
@@ -165,42 +165,34 @@ fn prepare_run(
     run: Vec<Example>,
     rng: &mut (impl Rng + Clone),
 ) -> Run {
-    // What is knocked over in the middle of a remembered run would have to stay so.
-    let may_recover = is_root && run.len() == 1 && examples.scoping().has_scopes();
-    let at_first = rng.clone();
-    let prepare = |example| {
-        *rng = at_first.clone();
-        prepare(examples, config, may_recover, example, rng)
+    let Some(family) = run.first().map(|example| examples.data().trials[example.trial].family) else {
+        return Run { decisions: Vec::new() };
     };
-    Run { decisions: run.into_iter().map(prepare).collect() }
-}
-
-fn prepare(
-    examples: &Examples<'_>,
-    config: &TrainConfig,
-    may_recover: bool,
-    example: Example,
-    rng: &mut impl Rng,
-) -> Views {
-    let data = examples.data();
-    let family = data.trials[example.trial].family;
-    let now = Span { begin: example.frame as u32, end: example.frame as u32 + 1 };
-    let mut views = Views {
-        n_slots: data.n_slots,
-        window: examples.specification_rows(example.demonstration, example.window),
-        state: States::Observations(examples.observations(example.trial, now)),
-        example,
+    let moment = |example: Example| {
+        let now = Span { begin: example.frame as u32, end: example.frame as u32 + 1 };
+        Moment { state: examples.observations(example.trial, now), example }
     };
+    let mut moments: Vec<Moment> = run.into_iter().map(moment).collect();
     // One draw, whatever the settings: see `Views::augment`.
     let mut recovery = Seed(rng.random()).rng();
     let recovers = recovery.random::<f32>() < config.recovery_states.unwrap_or_default();
-    if recovers && may_recover && family.builds_towers() {
-        let sub_tasks = examples.sub_tasks(views.example.demonstration);
-        let Views { state, example, .. } = &mut views;
-        state.iter_mut().for_each(|mut row| recovery::knock_over(&sub_tasks, example, &mut row, &mut recovery));
+    if recovers && is_root && examples.scoping().has_scopes() && family.builds_towers() {
+        let sub_tasks = examples.sub_tasks(moments[0].example.demonstration);
+        moments = recovery::disturbed(&sub_tasks, moments, &mut recovery);
     }
-    views.augment(family, config, rng);
-    views
+    let at_first = rng.clone();
+    let prepare = |Moment { example, state }| {
+        *rng = at_first.clone();
+        let mut views = Views {
+            n_slots: family.n_slots(),
+            window: examples.specification_rows(example.demonstration, example.window),
+            state: States::Observations(state),
+            example,
+        };
+        views.augment(family, config, rng);
+        views
+    };
+    Run { decisions: moments.into_iter().map(prepare).collect() }
 }
 
 pub(super) fn assemble(
@@ -210,7 +202,7 @@ pub(super) fn assemble(
     counts: Counts,
 ) -> Result<Part, TrainError> {
     let (part, steps) = packed(runs);
-    let n_slots = examples.data().n_slots;
+    let n_slots = examples.n_slots(level_idx);
     let n_programs = examples.known_programs().count();
     let windows = Windows::new(n_slots, &part.iter().map(|prepared| &prepared.window).collect::<Vec<_>>())?;
     let weight = 1.0 / counts.examples as f32;

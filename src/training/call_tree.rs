@@ -30,8 +30,8 @@ impl CallTree {
     /// # Errors
     ///
     /// [`TrainError::Trial`] when its calls and frames do not fit together.
-    pub(super) fn new(trial: &TrialData, n_slots: usize, scoping: ScopingKind) -> Result<Self, TrainError> {
-        check(trial, n_slots)?;
+    pub(super) fn new(trial: &TrialData, scoping: ScopingKind) -> Result<Self, TrainError> {
+        check(trial)?;
         let calls = &trial.calls;
         let mut callees = vec![Vec::new(); calls.len()];
         for (position, call) in calls.iter().enumerate() {
@@ -71,7 +71,8 @@ pub(super) fn moves_below(calls: &[ProgramCall], position: usize) -> Vec<SlotInd
 }
 
 /// What indexing relies on. An [`crate::trace::Episode`] holds it; a table that was tampered with may not.
-fn check(trial: &TrialData, n_slots: usize) -> Result<(), TrainError> {
+fn check(trial: &TrialData) -> Result<(), TrainError> {
+    let n_slots = trial.family.n_slots();
     let refuse = |problem: &str| {
         Err(TrainError::Trial { task: trial.task_id.clone(), trial: trial.trial, problem: problem.to_owned() })
     };

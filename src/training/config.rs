@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{EncoderKind, ScopingKind, Variant};
-use crate::trace::SpecificationForm;
+use crate::trace::{NoiseError, ObservationNoise, SpecificationForm};
 use crate::training::TrainError;
 use crate::training::detector_config::DetectorTraining;
 
@@ -47,6 +47,13 @@ impl Training {
         if self.config.relations && (!reads_vectors || self.variant.scoping() == ScopingKind::Arguments) {
             let found = format!("on for variant {}", self.variant);
             return refuse("relations", found, "on with flattened encoders of positions beside a specification");
+        }
+        if self.variant.sees() && !self.config.noise.is_none() {
+            return refuse("noise", format!("set for variant {}", self.variant), "variants that read positions");
+        }
+        if self.config.shared_root && !self.variant.reads_any_family() {
+            let found = format!("on for variant {}", self.variant);
+            return refuse("shared_root", found, "on with variants that read positions and a demonstration of them");
         }
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
@@ -148,6 +155,9 @@ pub struct TrainConfig {
     /// where categories share one it falls beside the others. Off by default.
     #[serde(skip_serializing_if = "is_zero")]
     pub merge_aside_m: f32,
+    /// How far the positions that it learns from are off. Not at all by default.
+    #[serde(skip_serializing_if = "ObservationNoise::is_none")]
+    pub noise: ObservationNoise,
     /// How many colours are told apart by networks on colour slots: one for each thing to be seen, one for the gripper, and
     /// some for letters, shadows and darker sides. By default three more than there are slots and a gripper.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,6 +171,10 @@ pub struct TrainConfig {
     /// paper, whose discussion names relationships between objects as future work.
     #[serde(skip_serializing_if = "is_off")]
     pub relations: bool,
+    /// Whether the root programs of all families are one to the network, so that it can be asked for a family that it was
+    /// not trained on. Off by default; for models of several families.
+    #[serde(skip_serializing_if = "is_off")]
+    pub shared_root: bool,
     /// How a detector is trained before the network behind it; for variants that have one.
     #[serde(skip_serializing_if = "DetectorTraining::is_default")]
     pub detector: DetectorTraining,
@@ -202,9 +216,11 @@ impl Default for TrainConfig {
             recovery_states: None,
             merge_containers: 0.0,
             merge_aside_m: 0.0,
+            noise: ObservationNoise::default(),
             colours: None,
             scope_kernel: None,
             relations: false,
+            shared_root: false,
             detector: DetectorTraining::default(),
             most_frames_in_memory: None,
             checkpoint_every: 100,
@@ -264,6 +280,10 @@ impl TrainConfig {
     pub fn check(&self) -> Result<(), TrainError> {
         let Self { pairing: _, curriculum: _, warmup_steps: _, loss, .. } = self;
         self.detector.check()?;
+        if let Err(NoiseError { key, found }) = self.noise.check() {
+            let key = if key == "offset_m" { "noise.offset_m" } else { "noise.frame_m" };
+            return Err(TrainError::Config { key, found: found.to_string(), allowed: "from 0 to 0.1" });
+        }
         let at_least_one = [
             ("steps", self.steps.unwrap_or(1)),
             ("batch", self.batch),

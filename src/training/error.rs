@@ -32,9 +32,10 @@ pub enum TrainError {
         /// Successful episodes of any split.
         total: usize,
     },
-    /// Trials of different families cannot be learned together.
+    /// Trials of different families cannot be learned together by every variant.
     #[error(
-        "the dataset holds more than one family: trial {trial} of task {task} is of {found}, the first of {expected}"
+        "variant {variant} cannot learn more than one family: trial {trial} of task {task} is of {found}, the first of \
+         {expected}; allowed: variants that read positions and a demonstration of them"
     )]
     MixedFamilies {
         /// The first trial that differs.
@@ -45,6 +46,8 @@ pub enum TrainError {
         found: &'static str,
         /// The family of the first trial.
         expected: &'static str,
+        /// The variant, and what it reads.
+        variant: String,
     },
     /// A trial does not fit together.
     #[error("trial {trial} of task {task}: {problem}")]

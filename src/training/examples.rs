@@ -7,9 +7,11 @@
 //!
 //! # Invariants
 //!
-//! Training tasks alone. Sub-tasks of A and B are matched by what they do (the arguments of the moves below them) and
-//! not by their number, since A and B may differ in how many objects there are. Of several alike in A the first is
-//! meant: which of them is a function of the state, the k-th is not. Below a sub-task, calls are matched by step.
+//! Training tasks alone. A level is a program in a family: each has examples of its own, so that a family of four tasks
+//! is learned from as often as one of a thousand beside it. Sub-tasks of A and B are matched by what they do (the
+//! arguments of the moves below them) and not by their number, since A and B may differ in how many objects there are.
+//! Of several alike in A the first is meant: which of them is a function of the state, the k-th is not. Below a
+//! sub-task, calls are matched by step.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +21,7 @@ use crate::dataset::{DatasetTrials, TrialData};
 use crate::model::{CalledWith, PictureIndex, ScopingKind, SpecificationRows};
 use crate::program::{KnownPrograms, Program};
 use crate::scene::SlotIndex;
-use crate::task::Split;
+use crate::task::{Family, Split};
 use crate::trace::{Observation, ObservationRows, ProgramCall, Span, SpecificationForm, instruction_spans};
 use crate::training::call_tree::{CallTree, moves_below};
 use crate::training::sub_task::SubTask;
@@ -80,10 +82,11 @@ pub struct Examples<'d> {
     levels: Vec<Level>,
 }
 
-/// The decisions of one running program.
+/// The decisions of one running program in one family.
 #[derive(Debug)]
 struct Level {
     program: Program,
+    family: Family,
     is_root: bool,
     /// Tasks in which it runs.
     tasks: Vec<usize>,
@@ -110,13 +113,13 @@ impl<'d> Examples<'d> {
         scoping: ScopingKind,
         grain: Grain,
     ) -> Result<Self, TrainError> {
-        let mut by_task: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+        let mut by_task: BTreeMap<(Family, &str), Vec<usize>> = BTreeMap::new();
         let (mut trees, mut parts) = (Vec::new(), Vec::new());
         for (position, trial) in data.trials.iter().enumerate() {
-            trees.push(CallTree::new(trial, data.n_slots, scoping)?);
+            trees.push(CallTree::new(trial, scoping)?);
             parts.push(parts_of(trial, specification)?);
             if trial.split == Split::Seen {
-                by_task.entry(&trial.task_id).or_default().push(position);
+                by_task.entry((trial.family, &trial.task_id)).or_default().push(position);
             }
         }
         let tasks: Vec<Vec<usize>> = by_task.into_values().collect();
@@ -127,13 +130,14 @@ impl<'d> Examples<'d> {
         let of_tasks =
             tasks.iter().enumerate().flat_map(|(task, trials)| trials.iter().map(move |&trial| (task, trial)));
         of_tasks.for_each(|(task, trial)| task_of_trial[trial] = Some(task));
-        let mut levels: BTreeMap<Program, Level> = BTreeMap::new();
+        let mut levels: BTreeMap<(Family, Program), Level> = BTreeMap::new();
         for (task, trials) in tasks.iter().enumerate() {
             for &trial in trials {
-                let root = data.trials[trial].calls[0].program;
+                let (root, family) = (data.trials[trial].calls[0].program, data.trials[trial].family);
                 for &program in trees[trial].decisions.keys() {
                     let is_root = program == root;
-                    let level = levels.entry(program).or_insert(Level { program, is_root, tasks: Vec::new() });
+                    let level = Level { program, family, is_root, tasks: Vec::new() };
+                    let level = levels.entry((family, program)).or_insert(level);
                     if level.tasks.last() != Some(&task) {
                         level.tasks.push(task);
                     }
@@ -144,22 +148,23 @@ impl<'d> Examples<'d> {
         Ok(Self { data, specification, parts, scoping, grain, trees, tasks, task_of_trial, levels })
     }
 
-    /// The same trials as a part of more: levels and tasks are numbered as those of all. A level that runs in none of
+    /// The same trials as a part of more of their one family: levels and tasks are numbered as those of all. A level that runs in none of
     /// these tasks cannot be drawn.
     pub(super) fn among(mut self, levels: &[(Program, bool)], task_ids: &[String]) -> Self {
         let number = |trials: &Vec<usize>| task_ids.binary_search(&self.data.trials[trials[0]].task_id).ok();
         let numbers: Vec<Option<usize>> = self.tasks.iter().map(number).collect();
         let renumbered = |task: Option<usize>| task.and_then(|task| numbers[task]);
         self.task_of_trial = self.task_of_trial.into_iter().map(renumbered).collect();
+        let Some(family) = self.data.trials.first().map(|trial| trial.family) else { return self };
         let mut own: BTreeMap<Program, Level> = self.levels.into_iter().map(|level| (level.program, level)).collect();
         let level = |&(program, is_root): &(Program, bool)| {
-            own.remove(&program).unwrap_or(Level { program, is_root, tasks: Vec::new() })
+            own.remove(&program).unwrap_or(Level { program, family, is_root, tasks: Vec::new() })
         };
         self.levels = levels.iter().map(level).collect();
         self
     }
 
-    /// The programs that decide, in the order of the program memory, and whether each is a root.
+    /// The programs that decide, family by family in the order of the program memory, and whether each is a root.
     pub fn levels(&self) -> impl Iterator<Item = (Program, bool)> {
         self.levels.iter().map(|level| (level.program, level.is_root))
     }
@@ -167,6 +172,11 @@ impl<'d> Examples<'d> {
     /// Whether a level runs in any of the trials.
     pub(super) fn has_level(&self, level_idx: usize) -> bool {
         self.levels.get(level_idx).is_some_and(|level| !level.tasks.is_empty())
+    }
+
+    /// Slots of the scenes in which a level's program decides.
+    pub(super) fn n_slots(&self, level_idx: usize) -> usize {
+        self.levels[level_idx].family.n_slots()
     }
 
     /// Ids of the tasks that are learned from, in order.
@@ -198,9 +208,10 @@ impl<'d> Examples<'d> {
 
     /// The observations of some of a trial's frames.
     pub(super) fn observations(&self, trial: usize, frames: Span) -> ObservationRows {
-        let width = Observation::width(self.data.n_slots);
+        let TrialData { family, observations, .. } = &self.data.trials[trial];
+        let width = Observation::width(family.n_slots());
         let rows = frames.begin as usize * width..frames.end as usize * width;
-        ObservationRows::new(self.data.n_slots, self.data.trials[trial].observations[rows].to_vec())
+        ObservationRows::new(family.n_slots(), observations[rows].to_vec())
     }
 
     /// The dataset behind.
@@ -208,9 +219,9 @@ impl<'d> Examples<'d> {
         self.data
     }
 
-    /// The programs that a network must know to learn from them: those of the trials' family.
+    /// The programs that a network must know to learn from them: those of the trials' families.
     pub fn known_programs(&self) -> KnownPrograms {
-        self.data.trials.first().map_or(KnownPrograms::FIRST, |trial| trial.family.programs())
+        self.levels.iter().map(|level| level.family.programs()).max().unwrap_or(KnownPrograms::FIRST)
     }
 
     /// Draws of a level: a task, a trial of it, a decision in it or all of a call, and the demonstration beside it.

@@ -3,7 +3,8 @@
 //! # Input and output
 //!
 //! A decision of the root program while it builds towers. Some of what stands is scattered, and the label becomes what
-//! an expert would do there: the first demonstrated sub-task whose relation does not hold.
+//! an expert would do there: the first demonstrated sub-task whose relation does not hold. Of a whole call, which a network
+//! with a memory learns from, one decision is disturbed so; the repairs follow it, and then the rest of the call.
 //!
 //! # Invariants
 //!
@@ -14,7 +15,7 @@ use rand::Rng;
 
 use crate::robot::{GRASP_M, HOVER_M};
 use crate::scene::SlotIndex;
-use crate::trace::{ObservationRowMut, Span};
+use crate::trace::{ObservationRowMut, ObservationRows, Span};
 use crate::training::examples::Example;
 use crate::training::sub_task::SubTask;
 
@@ -26,6 +27,68 @@ const APART_M: f32 = 0.055;
 const MAX_TRIES: usize = 16;
 /// How often the gripper has given way to what toppled the tower: it hovers then.
 const GIVES_WAY: f32 = 0.75;
+
+/// A decision and what is seen at it, in one row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Moment {
+    pub(super) example: Example,
+    pub(super) state: ObservationRows,
+}
+
+/// The decisions of a running root, or one of them, with a tower knocked over before one. Nothing happens where nothing
+/// is built there.
+pub(super) fn disturbed(sub_tasks: &[SubTask], mut moments: Vec<Moment>, rng: &mut impl Rng) -> Vec<Moment> {
+    let at = if moments.len() > 1 { rng.random_range(0..moments.len()) } else { 0 };
+    let Some(moment) = moments.get_mut(at) else { return moments };
+    let before = moment.clone();
+    let Moment { example, state } = moment;
+    state.iter_mut().for_each(|mut row| knock_over(sub_tasks, example, &mut row, rng));
+    if moments.len() > 1 && moments[at] != before {
+        let repairs = repairs(sub_tasks, before, &moments[at]);
+        moments.splice(at + 1..at + 1, repairs);
+    }
+    moments
+}
+
+/// What follows a repair that a disturbed moment begins: the other repairs, and last the moment before, at which nothing is
+/// left to repair.
+fn repairs(sub_tasks: &[SubTask], before: Moment, disturbed: &Moment) -> Vec<Moment> {
+    let mut repaired = Vec::new();
+    let mut state = disturbed.state.clone();
+    let holds = |sub_task: &&SubTask, state: &ObservationRows| state.get(0).is_some_and(|row| sub_task.holds(row));
+    let broken: Vec<&SubTask> = (sub_tasks.iter())
+        .filter(|sub_task| holds(sub_task, &before.state) && !holds(sub_task, &disturbed.state))
+        .collect();
+    for (number, sub_task) in broken.iter().enumerate() {
+        state.iter_mut().for_each(|row| put_back(sub_task, row.positions));
+        let Some(next) = broken.get(number + 1) else { break };
+        let mut example = before.example.clone();
+        call(next, &mut example);
+        repaired.push(Moment { example, state: state.clone() });
+    }
+    repaired.push(Moment { state, ..before });
+    repaired
+}
+
+/// Puts a sub-task's source where it belongs. The gripper, which positions are relative to, has just let it go.
+fn put_back(sub_task: &SubTask, positions: &mut [[f32; 3]]) {
+    let [source, target] = [sub_task.source, sub_task.target].map(|slot| usize::from(slot.0));
+    let place: [f32; 3] = std::array::from_fn(|axis| positions[target][axis] + sub_task.offset_m[axis]);
+    positions[source] = place;
+    let [x, y, z] = place;
+    let gripper = [x, y, z + GRASP_M];
+    positions.iter_mut().for_each(|position| (0..3).for_each(|axis| position[axis] -= gripper[axis]));
+}
+
+/// Makes a decision one that begins a sub-task.
+fn call(sub_task: &SubTask, example: &mut Example) {
+    let SubTask { program, source, part, .. } = sub_task;
+    example.callee = *program;
+    example.end_of_program = false;
+    example.scope = Some(Span { begin: part.begin - example.window.begin, end: part.end - example.window.begin });
+    example.next_move = Some(*source);
+    example.last_decision = false;
+}
 
 /// Topples what rests on one of the finished sub-tasks' targets and labels the decision anew. Nothing happens while
 /// nothing is built, or while something is held.
@@ -46,13 +109,9 @@ pub(super) fn knock_over(
     if rng.random::<f32>() < GIVES_WAY {
         state.positions.iter_mut().for_each(|position| position[2] -= HOVER_M - GRASP_M);
     }
-    let Some(next) = sub_tasks.iter().find(|sub_task| !sub_task.holds(state.as_row())) else { return };
-    example.callee = next.program;
-    example.end_of_program = false;
-    example.scope =
-        Some(Span { begin: next.part.begin - example.window.begin, end: next.part.end - example.window.begin });
-    example.next_move = Some(next.source);
-    example.last_decision = false;
+    if let Some(next) = sub_tasks.iter().find(|sub_task| !sub_task.holds(state.as_row())) {
+        call(next, example);
+    }
 }
 
 /// A slot and all that rests on it, from below.
@@ -171,6 +230,34 @@ mod tests {
         }
         assert_eq!((example.callee, example.end_of_program), (Program::PickAndPlace, false));
         assert!(example.scope.is_some() && !example.last_decision);
+    }
+
+    #[test]
+    fn a_call_goes_on_where_it_was_disturbed_once_all_is_repaired() {
+        let sub_tasks = sub_tasks();
+        let flat =
+            Observation { slots_m: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.2, 0.0, 0.0]], closed: false };
+        let moment =
+            |observation: &Observation, example| Moment { example, state: ObservationRows::of(4, [observation]) };
+        let before = vec![moment(&flat, decision()), moment(&tower(), decision())];
+        let mut lengths = [0; 5];
+        for seed in 0..60 {
+            let call = disturbed(&sub_tasks, before.clone(), &mut Seed(seed).rng());
+            lengths[call.len()] += 1;
+            let (last, repairs) = call[1..].split_last().unwrap();
+            assert_eq!(call[0], before[0], "what came before stays");
+            assert_eq!(last.example, before[1].example, "the call goes on");
+            let row = last.state.get(0).unwrap();
+            let height = |slot: usize| row.positions[slot][2] - row.positions[0][2];
+            assert!((height(1) - 0.05).abs() < 1e-6 && (height(2) - 0.1).abs() < 1e-6, "the tower stands again");
+            let repaired: Vec<_> = repairs.iter().map(|repair| repair.example.next_move.unwrap().0).collect();
+            assert!([vec![1, 2], vec![2], vec![]].contains(&repaired), "{repaired:?}");
+            if !repairs.is_empty() {
+                let held = [0.0, 0.0, -GRASP_M];
+                assert!((0..3).all(|axis| (row.positions[2][axis] - held[axis]).abs() < 1e-6), "just let go");
+            }
+        }
+        assert!(lengths[2] > 0 && lengths[3] > 0 && lengths[4] > 0, "{lengths:?}");
     }
 
     #[test]

@@ -169,7 +169,7 @@ impl Shown {
     fn views(&self, examples: &Examples<'_>, example: Example) -> Views {
         let window = example.window.begin as usize..example.window.end as usize;
         Views {
-            n_slots: examples.data().n_slots,
+            n_slots: examples.data().trials[example.trial].family.n_slots(),
             window: SpecificationRows::Pictures(
                 window.map(|frame| self.picture(example.demonstration, frame)).collect(),
             ),

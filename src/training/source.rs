@@ -55,8 +55,7 @@ pub struct TrialStream {
 pub(super) struct Facts {
     /// Hash of what is learned from: a checkpoint belongs to it.
     pub(super) hash: String,
-    /// The one family.
-    pub(super) family: Family,
+    families: Families,
     pub(super) n_slots: usize,
     /// Frames of the longest trial.
     pub(super) longest: usize,
@@ -66,10 +65,18 @@ pub(super) struct Facts {
     callers: BTreeMap<Program, bool>,
 }
 
+/// The families of trials, in the order in which they came.
+#[derive(Clone, Debug, Default)]
+struct Families {
+    all: Vec<Family>,
+    /// The first trial that is not of the first family, and its task.
+    other: Option<(u32, String)>,
+}
+
 /// Facts as trials come.
 struct Gathered {
     hasher: Sha256,
-    family: Option<Family>,
+    families: Families,
     longest: usize,
     task_ids: BTreeSet<String>,
     callers: BTreeMap<Program, bool>,
@@ -78,18 +85,16 @@ struct Gathered {
 impl Gathered {
     fn new() -> Self {
         let (task_ids, callers) = (BTreeSet::new(), BTreeMap::new());
-        Self { hasher: Sha256::new(), family: None, longest: 0, task_ids, callers }
+        Self { hasher: Sha256::new(), families: Families::default(), longest: 0, task_ids, callers }
     }
 
-    fn add(&mut self, trial: &TrialData) -> Result<(), TrainError> {
-        let family = *self.family.get_or_insert(trial.family);
-        if trial.family != family {
-            return Err(TrainError::MixedFamilies {
-                trial: trial.trial,
-                task: trial.task_id.clone(),
-                found: trial.family.name(),
-                expected: family.name(),
-            });
+    fn add(&mut self, trial: &TrialData) {
+        let Families { all, other } = &mut self.families;
+        if !all.contains(&trial.family) {
+            if !all.is_empty() && other.is_none() {
+                *other = Some((trial.trial, trial.task_id.clone()));
+            }
+            all.push(trial.family);
         }
         self.longest = self.longest.max(trial.n_frames);
         if trial.split == Split::Seen && !self.task_ids.contains(&trial.task_id) {
@@ -100,18 +105,40 @@ impl Gathered {
             self.callers.insert(caller.program, Some(caller.program) == root);
         }
         hash(&mut self.hasher, trial);
-        Ok(())
     }
 
     fn facts(self, n_slots: usize) -> Result<Facts, TrainError> {
-        let Self { hasher, family, longest, task_ids, callers } = self;
-        let family = family.ok_or(TrainError::NoTrials { total: 0 })?;
+        let Self { hasher, families, longest, task_ids, callers } = self;
+        if families.all.is_empty() {
+            return Err(TrainError::NoTrials { total: 0 });
+        }
         let task_ids = task_ids.into_iter().collect();
-        Ok(Facts { hash: artifact::hex(&hasher.finalize()), family, n_slots, longest, task_ids, callers })
+        Ok(Facts { hash: artifact::hex(&hasher.finalize()), families, n_slots, longest, task_ids, callers })
     }
 }
 
 impl Facts {
+    /// The first family, and the others.
+    pub(super) fn first_family(&self) -> Result<(Family, Vec<Family>), TrainError> {
+        let (first, others) = self.families.all.split_first().ok_or(TrainError::NoTrials { total: 0 })?;
+        Ok((*first, others.to_vec()))
+    }
+
+    /// Refuses several families for whom cannot learn them together.
+    pub(super) fn check_one_family(&self, learner: &str) -> Result<(), TrainError> {
+        let Families { all, other } = &self.families;
+        match (&all[..], other) {
+            ([first, second, ..], Some((trial, task))) => Err(TrainError::MixedFamilies {
+                trial: *trial,
+                task: task.clone(),
+                found: second.name(),
+                expected: first.name(),
+                variant: learner.to_owned(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// The programs that decide, in the order of the program memory, and whether each is a root.
     pub(super) fn levels(&self, scoping: ScopingKind) -> Vec<(Program, bool)> {
         let decides = |(_, is_root): &(Program, bool)| *is_root || scoping != ScopingKind::Primitives;
@@ -140,9 +167,10 @@ impl TrialStream {
         let shards = cut(&trials, n_frames as usize);
         let mut gathered = Gathered::new();
         for shard in &shards {
-            trials.read(shard.clone())?.iter().try_for_each(|trial| gathered.add(trial))?;
+            trials.read(shard.clone())?.iter().for_each(|trial| gathered.add(trial));
         }
         let facts = gathered.facts(trials.n_slots)?;
+        facts.check_one_family("of any kind, from trials that are streamed from disk,")?;
         Ok(Self { trials, shards, facts })
     }
 
@@ -294,7 +322,7 @@ impl Source<'_> {
     ///
     /// # Errors
     ///
-    /// [`TrainError`] when there is none, or they are of several families.
+    /// [`TrainError`] when there is none.
     pub(super) fn facts(&self) -> Result<Facts, TrainError> {
         match self {
             Self::Here(data, _) => facts_of(data),
@@ -322,7 +350,7 @@ impl Source<'_> {
 /// What is known of trials in memory.
 pub(super) fn facts_of(data: &DatasetTrials) -> Result<Facts, TrainError> {
     let mut gathered = Gathered::new();
-    data.trials.iter().try_for_each(|trial| gathered.add(trial))?;
+    data.trials.iter().for_each(|trial| gathered.add(trial));
     gathered.facts(data.n_slots)
 }
 

@@ -12,7 +12,7 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
-use ntp::trace::{Actor, Episode, Provenance, Span, SpecificationForm, Vocabulary, instructions};
+use ntp::trace::{Actor, Episode, ObservationNoise, Provenance, Span, SpecificationForm, Vocabulary, instructions};
 use ntp::training::{
     Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, Source, TrainConfig,
     TrainError, TrainSummary, Training, TrialStream, draw, train, train_from,
@@ -437,7 +437,6 @@ fn data_and_settings_that_make_no_sense_are_refused() {
     assert!(matches!(refused(&config, &broken), TrainError::Trial { trial: 0, .. }));
     let mut mixed = towers();
     mixed.trials.extend(demonstrations(&[sorting("m", [0, 1, 2, 3], Split::Seen)], 1).trials);
-    assert!(matches!(refused(&config, &mixed), TrainError::MixedFamilies { .. }));
     let none = TrainConfig { steps: Some(0), ..config.clone() };
     assert!(matches!(refused(&none, &towers()), TrainError::Config { key: "steps", .. }));
     let much = TrainConfig { gripper_jitter: Some(1.5), ..config };
@@ -532,6 +531,114 @@ fn relations_are_read_by_flattened_networks_alone() {
     };
     // Three layers read 28 displacements of 6 numbers more.
     assert_eq!(parameters(true), parameters(false) + 3 * 28 * 6 * 96);
+}
+
+/// Towers, and objects sorted, to be learned together.
+fn towers_and_sorting() -> DatasetTrials {
+    let sorting =
+        demonstrations(&[sorting("a", [0, 1, 2, 3], Split::Seen), sorting("m", [1, 0, 3, 2], Split::Seen)], 2);
+    DatasetTrials::together(vec![towers(), sorting])
+}
+
+#[test]
+fn families_that_are_learned_together_have_levels_of_their_own() {
+    let data = towers_and_sorting();
+    let examples = Examples::new(&data).unwrap();
+    let levels: Vec<Program> = examples.levels().map(|(program, _)| program).collect();
+    let [stacking, sorting] = [Program::BlockStacking, Program::ObjectSorting];
+    let of_towers = [stacking, Program::PickAndPlace, Program::Pick, Program::Place];
+    assert_eq!(levels, [of_towers.as_slice(), &[sorting, Program::PickAndDrop, Program::Pick, Program::Drop]].concat());
+    assert_eq!(examples.task_ids(), ["a", "b", "a", "m"], "tasks of different families may share a name");
+    let mut rng = Seed(1).rng();
+    for (level, family) in [(2, Family::BlockStacking), (6, Family::ObjectSorting)] {
+        let drawn = (0..50).flat_map(|_| examples.draw(level, Pairing::Cross, &mut rng)).collect::<Vec<_>>();
+        assert!(drawn.iter().all(|example| data.trials[example.trial].family == family));
+    }
+}
+
+#[test]
+fn one_network_learns_families_of_different_slots() {
+    let kits = sample(Family::Kitting, 2, 0, Seed(4)).unwrap().tasks;
+    let data = DatasetTrials { n_slots: 12, ..DatasetTrials::together(vec![towers(), demonstrations(&kits, 2)]) };
+    let folder = tempfile::tempdir().unwrap();
+    for variant in [Variant::NTP, Variant::NTP_PAPER, Variant::FLAT_GRU_PAPER] {
+        train_until(&Training { variant, ..ntp(short()) }, &data, folder.path(), None).unwrap();
+        let config = ntp::model::load_config(folder.path()).unwrap();
+        assert_eq!(config.families().collect::<Vec<_>>(), [Family::BlockStacking, Family::Kitting]);
+        assert!(config.acts(Family::Kitting) && !config.acts(Family::ObjectSorting));
+        assert!(config.reads_slots(8) && config.reads_slots(12));
+        let rate = success_rate(folder.path(), Decoder::Mss, &kits[..1]);
+        assert!((0.0..=1.0).contains(&rate), "it acts kits as well as towers");
+    }
+    let npi = Training { variant: Variant::NPI, ..ntp(short()) };
+    assert_eq!(
+        train_until(&npi, &data, folder.path(), None).unwrap_err().to_string(),
+        "variant npi with trajectories cannot learn more than one family: trial 0 of task kit_XXXXXX is of kitting, the \
+         first of block_stacking; allowed: variants that read positions and a demonstration of them"
+            .replace("kit_XXXXXX", &kits[0].id)
+    );
+}
+
+#[test]
+fn roots_that_are_one_program_act_families_that_were_not_trained_on() {
+    let kits = sample(Family::Kitting, 2, 0, Seed(4)).unwrap().tasks;
+    let shared = TrainConfig { shared_root: true, ..short() };
+    let folder = tempfile::tempdir().unwrap();
+    train_until(&ntp(shared.clone()), &towers(), folder.path(), None).unwrap();
+    let config = ntp::model::load_config(folder.path()).unwrap();
+    assert!(config.acts(Family::Kitting) && config.reads_slots(12));
+    let rate = success_rate(folder.path(), Decoder::Mss, &kits);
+    assert!((0.0..=1.0).contains(&rate), "it acts kits");
+    let npi = Training { variant: Variant::NPI, ..ntp(shared) };
+    assert_eq!(
+        train_until(&npi, &towers(), folder.path(), None).unwrap_err().to_string(),
+        "shared_root is on for variant npi; allowed: on with variants that read positions and a demonstration of them"
+    );
+}
+
+#[test]
+fn a_model_of_eight_blocks_builds_with_sixteen() {
+    let seen = sample(Family::BlockStacking, 20, 0, Seed(3)).unwrap().tasks;
+    let more = sample(Family::TowerBuilding, 0, 20, Seed(3)).unwrap().tasks;
+    assert!(more.iter().any(|task| task.tallest() == 6) && more.iter().any(|task| task.goals.len() > 7));
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig { steps: Some(500), gripper_jitter: Some(0.0), ..TrainConfig::default() };
+    train_until(&ntp(config), &demonstrations(&seen, 10), folder.path(), None).unwrap();
+    let rate = success_rate(folder.path(), Decoder::Mss, &more);
+    assert!(rate >= 0.7, "{rate}");
+}
+
+#[test]
+fn a_network_with_a_memory_learns_repairs_within_calls() {
+    let data = towers();
+    let grain = Grain::Call;
+    let examples = Examples::of(&data, SpecificationForm::default(), ScopingKind::Scoped, grain).unwrap();
+    let longest = |recovery_states| {
+        let config = resolved(TrainConfig { recovery_states: Some(recovery_states), ..TrainConfig::default() });
+        let parts = (0..20).flat_map(|seed| draw(&examples, &config, 0, 8, Seed(seed)).unwrap());
+        parts.map(|part| part.steps.len()).max().unwrap()
+    };
+    // Two goals and the end, and both goals again.
+    assert_eq!((longest(0.0), longest(1.0)), (3, 5));
+}
+
+#[test]
+fn noise_puts_demonstration_and_state_off_and_nothing_else() {
+    let data = towers();
+    let examples = Examples::new(&data).unwrap();
+    let noisy =
+        |frame_m, offset_m| TrainConfig { noise: ObservationNoise { frame_m, offset_m }, ..TrainConfig::default() };
+    let drawn = |config: &TrainConfig| draw(&examples, &resolved(config.clone()), 0, 8, Seed(3)).unwrap().remove(0);
+    let (exact, off) = (drawn(&noisy(0.0, 0.0)), drawn(&noisy(0.01, 0.02)));
+    assert_eq!((&exact.programs, &exact.scopes, &exact.ends), (&off.programs, &off.scopes, &off.ends));
+    assert!(exact.windows != off.windows && exact.states != off.states);
+    let folder = tempfile::tempdir().unwrap();
+    for (config, told) in
+        [(noisy(-0.01, 0.0), "noise.frame_m is -0.01"), (noisy(0.0, f32::NAN), "noise.offset_m is NaN")]
+    {
+        let error = train_until(&ntp(config), &data, folder.path(), None).unwrap_err().to_string();
+        assert_eq!(error, format!("{told}; allowed: from 0 to 0.1"));
+    }
 }
 
 #[test]

@@ -33,8 +33,17 @@ pub struct TrialData {
 /// A dataset in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DatasetTrials {
-    /// Slots of every scene in it.
+    /// Slots of every scene in it; of several datasets the most.
     pub n_slots: usize,
     /// Its successful episodes in order of index.
     pub trials: Vec<TrialData>,
+}
+
+impl DatasetTrials {
+    /// Several datasets as one, to be learned together.
+    #[must_use]
+    pub fn together(datasets: Vec<Self>) -> Self {
+        let n_slots = datasets.iter().map(|dataset| dataset.n_slots).max().unwrap_or_default();
+        Self { n_slots, trials: datasets.into_iter().flat_map(|dataset| dataset.trials).collect() }
+    }
 }
