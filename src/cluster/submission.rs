@@ -178,6 +178,7 @@ impl Submission {
         options: &SubmitOptions,
     ) -> Result<Self, ClusterError> {
         let folder = run.join(FOLDER);
+        check_models(file)?;
         let copies = Copies::of(file)?;
         let (pipeline_sha256, ntp_sha256) = (copies.hash()?, sha256_file(program)?);
         let before: Option<About> = About::read(run).ok();
@@ -211,6 +212,19 @@ pub(super) struct Chain {
     /// The experiment's pipeline file, below `submit/pipeline`.
     pub(super) pipeline: PathBuf,
     pub(super) stages: Vec<SubmittedStage>,
+}
+
+/// A model that learns from several experiments belongs to none of the chains.
+fn check_models(file: &PipelineFile) -> Result<(), PipelineError> {
+    match file {
+        PipelineFile::Study(study) if !study.spec.models.is_empty() => Err(PipelineError::Value {
+            path: study.path.clone(),
+            key: "models".to_owned(),
+            problem: "learn from several experiments, and are made by ntp run alone; allowed is none to be submitted"
+                .to_owned(),
+        }),
+        PipelineFile::Study(_) | PipelineFile::Experiment(_) => Ok(()),
+    }
 }
 
 /// What is left of each experiment, with a list a stage of the items of each task.

@@ -11,12 +11,14 @@ use crate::trace::SpecificationForm;
 #[derive(Clone, Debug)]
 pub struct RunDir {
     root: PathBuf,
+    /// The run directory of the study that it is part of.
+    study: Option<PathBuf>,
 }
 
 impl RunDir {
     /// The run directory at `root`; nothing is read or written.
     pub fn new(root: impl Into<PathBuf>) -> Self {
-        Self { root: root.into() }
+        Self { root: root.into(), study: None }
     }
 
     /// Where it is.
@@ -26,7 +28,12 @@ impl RunDir {
 
     /// The run directory of an experiment of a study.
     pub fn experiment(&self, name: &str) -> Self {
-        Self { root: self.root.join(name) }
+        Self { root: self.root.join(name), study: Some(self.root.clone()) }
+    }
+
+    /// The run directory of the study that an experiment is part of; its own for anything else.
+    pub(super) fn of_study(&self) -> Self {
+        Self { root: self.study.as_ref().unwrap_or(&self.root).clone(), study: None }
     }
 
     fn stage(&self, stage: Stage, folder: &str) -> StageDir {

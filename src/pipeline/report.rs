@@ -21,26 +21,35 @@ const VERSION: u32 = 5;
 /// The report of an experiment, or of all of a study.
 pub(super) struct Report<'p> {
     title: &'p str,
-    /// Whether each experiment has a folder of its name below the run directory.
-    is_study: bool,
+    /// The study that it is of: each experiment has a folder of its name below the run directory.
+    study: Option<&'p Study>,
     experiments: Vec<&'p Pipeline>,
 }
 
 pub(super) fn units(pipeline: &Pipeline) -> Vec<Report<'_>> {
     let title = pipeline.spec.report.title.as_deref().unwrap_or(&pipeline.spec.name);
-    vec![Report { title, is_study: false, experiments: vec![pipeline] }]
+    vec![Report { title, study: None, experiments: vec![pipeline] }]
 }
 
 /// The one report of a study.
 pub(super) fn of_study(study: &Study) -> Report<'_> {
-    Report { title: study.title(), is_study: true, experiments: study.experiments.iter().collect() }
+    Report { title: study.title(), study: Some(study), experiments: study.experiments.iter().collect() }
 }
 
 impl<'p> Report<'p> {
     /// The experiments with their run directories.
     fn runs(&self, run: &RunDir) -> Vec<(&'p Pipeline, RunDir)> {
-        let own = |pipeline: &Pipeline| if self.is_study { run.experiment(&pipeline.spec.name) } else { run.clone() };
+        let own = |pipeline: &Pipeline| match self.study {
+            Some(_) => run.experiment(&pipeline.spec.name),
+            None => run.clone(),
+        };
         self.experiments.iter().map(|&pipeline| (pipeline, own(pipeline))).collect()
+    }
+
+    /// Everything that was acted of an experiment.
+    fn acted(&self, pipeline: &'p Pipeline) -> Vec<rollout::Suite<'p>> {
+        let of_study = self.study.map(|study| rollout::units_of_study(study, pipeline));
+        rollout::units(pipeline).into_iter().chain(of_study.unwrap_or_default()).collect()
     }
 }
 
@@ -68,8 +77,8 @@ impl Unit for Report<'_> {
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         let mut inputs = BTreeMap::new();
         for (pipeline, run) in self.runs(run) {
-            let experiment = if self.is_study { format!("{}: ", pipeline.spec.name) } else { String::new() };
-            for unit in rollout::units(pipeline) {
+            let experiment = self.study.map(|_| format!("{}: ", pipeline.spec.name)).unwrap_or_default();
+            for unit in self.acted(pipeline) {
                 inputs.insert(format!("{experiment}{}", unit.name()), unit.dir(&run).version()?);
             }
             for (name, path) in annotations(pipeline, &run) {

@@ -204,12 +204,11 @@ impl Pipeline {
     /// How a model acts, and what.
     fn check_acting(&self, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
         let key = |field: &str| format!("models[{idx}].{field}");
-        if model.decoders.is_empty() {
-            return Err(self.value(&key("decoders"), format!("is empty; allowed are {}", decoder_names())));
+        if !model.experiments.is_empty() {
+            let problem = "is of a study's own models; a model of one experiment learns from that one";
+            return Err(self.value(&key("experiments"), problem));
         }
-        if let Some(twice) = first_repeated(&model.decoders) {
-            return Err(self.value(&key("decoders"), format!("{} is there twice", twice.name())));
-        }
+        check_decoders(&self.path, idx, model)?;
         let Some(suites) = &model.suites else { return Ok(()) };
         if let Some(twice) = first_repeated(suites) {
             return Err(self.value(&key("suites"), format!("{twice:?} is there twice")));
@@ -240,6 +239,17 @@ impl Pipeline {
         if let Err(problem) = suite.simulation(&self.spec.generate.simulation).check() {
             return Err(self.value(&key("layout"), problem.to_string()));
         }
+        if let Err(problem) = suite.noise.check() {
+            return Err(self.value(&key("noise"), problem.to_string()));
+        }
+        let sees = |model: &&ModelSpec| model.variant.sees() && model.acts(&suite.name);
+        if let Some(model) = self.spec.models.iter().find(sees).filter(|_| !suite.noise.is_none()) {
+            let problem = format!(
+                "is of positions, but {} sees and acts it; allowed are models that read positions",
+                model.variant
+            );
+            return Err(self.value(&key("noise"), problem));
+        }
         self.check_towers(&key, suite)?;
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;
         self.check_counts(&key("on_table"), suite.on_table)?;
@@ -264,7 +274,11 @@ impl Pipeline {
             return Err(self.value(&key("adversary"), problem.to_string()));
         }
         let family = self.spec.tasks.family;
-        let said = [("adversary", suite.adversary.is_some()), ("order", suite.order != OrderSpec::Own)];
+        let said = [
+            ("adversary", suite.adversary.is_some()),
+            ("order", suite.order != OrderSpec::Own),
+            ("tallest", suite.tallest.is_some()),
+        ];
         match said.into_iter().find(|&(_, is_said)| is_said && !family.builds_towers()) {
             Some((field, _)) => {
                 let builders = Family::ALL.into_iter().filter(|family| family.builds_towers()).map(Family::name);
@@ -298,6 +312,16 @@ pub(super) fn check_name(path: &Path, key: &str, name: &str) -> Result<(), Pipel
         return Err(PipelineError::Value { path: path.to_owned(), key: key.to_owned(), problem });
     }
     Ok(())
+}
+
+/// How a model decodes.
+pub(super) fn check_decoders(path: &Path, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
+    let problem = match first_repeated(&model.decoders) {
+        _ if model.decoders.is_empty() => format!("is empty; allowed are {}", decoder_names()),
+        Some(twice) => format!("{} is there twice", twice.name()),
+        None => return Ok(()),
+    };
+    Err(PipelineError::Value { path: path.to_owned(), key: format!("models[{idx}].decoders"), problem })
 }
 
 fn first_repeated<T: PartialEq>(items: &[T]) -> Option<&T> {

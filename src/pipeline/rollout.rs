@@ -16,13 +16,13 @@ use crate::pipeline::train::{self, Model};
 use crate::pipeline::trials::trial;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{
-    OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, SuiteSpec, detections, facts, tasks,
+    OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, Study, SuiteSpec, detections, facts, tasks,
 };
 use crate::recording::ShardWriter;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
-    self, Acted, DetectionRows, Limits, ModelFacts, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows, Sight,
-    Start, load_policy_on,
+    self, Acted, DetectionRows, Limits, ModelFacts, Noisy, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows,
+    Sight, Start, load_policy_on,
 };
 use crate::seed::Seed;
 use crate::sim::Simulation;
@@ -59,10 +59,24 @@ pub(super) struct ModelActor<'p> {
 /// Every suite of the oracle, where it is asked for, then of every model with each of its seeds and decoders.
 pub(super) fn units(pipeline: &Pipeline) -> Vec<Suite<'_>> {
     let oracle = pipeline.spec.rollout.oracle.then_some(None);
-    let models = train::units(pipeline).into_iter();
-    let actors =
-        models.flat_map(|model| model.spec.decoders.iter().map(move |&decoder| Some(ModelActor { model, decoder })));
+    let actors = train::units(pipeline).into_iter().flat_map(decoding).map(Some);
     oracle.into_iter().chain(actors).flat_map(|actor| acted(pipeline, actor)).collect()
+}
+
+/// Every suite of an experiment that the study's own models act, with each of their seeds and decoders.
+pub(super) fn units_of_study<'p>(study: &'p Study, pipeline: &'p Pipeline) -> Vec<Suite<'p>> {
+    let models = train::units_of_study(study).into_iter().filter(|model| study.can_act(model.spec, pipeline));
+    let suites = models.flat_map(decoding).flat_map(|actor| acted(pipeline, Some(actor)));
+    let is_fair = |suite: &Suite<'_>| {
+        let learned = |actor: ModelActor<'_>| study.learned_by(actor.model.spec).any(|own| own.path == pipeline.path);
+        suite.spec.split == Split::Unseen || suite.actor.is_some_and(learned)
+    };
+    suites.filter(is_fair).collect()
+}
+
+/// A model with each of its decoders.
+fn decoding(model: Model<'_>) -> impl Iterator<Item = ModelActor<'_>> {
+    model.spec.decoders.iter().map(move |&decoder| ModelActor { model, decoder })
 }
 
 /// The suites that an actor acts.
@@ -241,7 +255,10 @@ fn suite_tasks(
 ) -> Result<Vec<Task>, PipelineError> {
     let demonstrations = demonstrations(pipeline, spec);
     let ordered = |task: &Task| demonstrations.ordered(task);
-    let is_asked_for = |task: &&Task| spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls);
+    let is_asked_for = |task: &&Task| {
+        spec.bowls.is_none_or(|bowls| task.n_bowls() == bowls)
+            && spec.tallest.is_none_or(|tallest| task.tallest() == tallest)
+    };
     let tasks: Vec<Task> = task_set
         .of_split(spec.split)
         .take(most.unwrap_or(usize::MAX))
@@ -250,6 +267,10 @@ fn suite_tasks(
         .collect();
     if tasks.is_empty() {
         let (field, problem) = match (spec.order, spec.bowls) {
+            _ if spec.tallest.is_some() => {
+                let tallest = spec.tallest.unwrap_or_default();
+                ("tallest", format!("is {tallest}, but no {} task's tallest tower is as high", spec.split))
+            }
             (OrderSpec::Shuffled, _) => ("order", format!("is shuffled, but no {} task has two towers", spec.split)),
             (OrderSpec::Own, Some(bowls)) => ("bowls", format!("is {bowls}, but no {} task has as many", spec.split)),
             (OrderSpec::Own, None) => ("split", format!("is {}, but there is no such task", spec.split)),
@@ -340,10 +361,16 @@ impl Acting<'_> {
     }
 
     fn policy(&self, starts: &[Start<'_>]) -> Result<Box<dyn Policy>, PipelineError> {
-        Ok(match &self.learned {
+        let policy = match &self.learned {
             Some(learned) => learned.policy(self.pipeline, self.job.context.options.device)?,
             None => Box::new(Oracle::for_starts(starts)),
-        })
+        };
+        let noise = self.spec.noise;
+        if noise.is_none() {
+            return Ok(policy);
+        }
+        let seeds = starts.iter().map(|start| Seed(start.provenance.seed)).collect();
+        Ok(Box::new(Noisy::new(policy, noise, seeds)))
     }
 
     /// The errors of a detector, which are the same whatever decodes what is behind it.

@@ -9,7 +9,8 @@ use crate::feature::Feature;
 use crate::pipeline::costs::{Costs, Measured};
 use crate::pipeline::unit::{Context, Job, Made, Unit, Worker};
 use crate::pipeline::{
-    Options, Pipeline, PipelineError, RunDir, Scope, Stage, StageReport, Status, Study, report, shared, upstream,
+    Options, Pipeline, PipelineError, RunDir, Scope, Stage, StageReport, Status, Study, report, rollout, shared, train,
+    upstream,
 };
 use crate::progress::Stopwatch;
 
@@ -25,9 +26,7 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
     if !options.dry_run && !options.scope.is_shared() {
         remove_partials(dir.root())?;
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|error| {
-        PipelineError::Value { path: pipeline.path.clone(), key: "--jobs".to_owned(), problem: error.to_string() }
-    })?;
+    let pool = pool(&pipeline.path, options)?;
     let context = Context { dir, options };
     let mut reports = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|stage| (options.from..=options.to).contains(stage)) {
@@ -44,7 +43,8 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
     Ok(reports)
 }
 
-/// Runs the chosen stages of every experiment of a study, each in a folder of its name, then the report of them all.
+/// Runs the chosen stages of every experiment of a study, each in a folder of its name; then the study's own models and
+/// what they act, and the report of them all.
 ///
 /// # Errors
 ///
@@ -62,11 +62,40 @@ pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<S
         let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
         reports.extend(run(pipeline, &dir.experiment(&pipeline.spec.name), &options)?);
     }
+    reports.extend(run_models(study, dir, options)?);
     if options.to == Stage::Report {
         let own = upstream::boxed(vec![report::of_study(study)]);
         reports.extend(run_units(&Context { dir, options }, &study.path, own)?);
     }
     Ok(reports)
+}
+
+/// Trains the study's own models, and lets them act the suites of its experiments.
+fn run_models(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+    let is_asked_for = |stage| (options.from..=options.to).contains(&stage);
+    let mut reports = Vec::new();
+    if is_asked_for(Stage::Train) {
+        let models = upstream::boxed(train::units_of_study(study));
+        reports
+            .extend(pool(&study.path, options)?.install(|| run_units(&Context { dir, options }, &study.path, models))?);
+    }
+    for pipeline in study.experiments.iter().filter(|_| is_asked_for(Stage::Rollout)) {
+        let suites = upstream::boxed(rollout::units_of_study(study, pipeline));
+        let own = dir.experiment(&pipeline.spec.name);
+        let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
+        let _lock = if suites.is_empty() { None } else { lock(&own, &options)? };
+        let context = Context { dir: &own, options: &options };
+        reports.extend(pool(&study.path, &options)?.install(|| run_units(&context, &study.path, suites))?);
+    }
+    Ok(reports)
+}
+
+fn pool(path: &Path, options: &Options) -> Result<rayon::ThreadPool, PipelineError> {
+    rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|error| PipelineError::Value {
+        path: path.to_owned(),
+        key: "--jobs".to_owned(),
+        problem: error.to_string(),
+    })
 }
 
 /// The units of a stage, in the pipeline file's order.

@@ -9,7 +9,7 @@ use crate::render::CameraConfig;
 use crate::robot::RobotKind;
 use crate::sim::{AdversaryConfig, SimulationConfig};
 use crate::task::{Family, Layout, Split, TaskPool};
-use crate::trace::SpecificationForm;
+use crate::trace::{ObservationNoise, SpecificationForm};
 use crate::training::{TrainConfig, Training};
 
 /// One experiment.
@@ -51,7 +51,7 @@ pub struct TasksSpec {
     /// How many are held out. Left out with `import`: all the others.
     #[serde(default)]
     pub unseen: Option<u32>,
-    /// Block Stacking: only the first so many blocks, 2 to 8, are within reach; the others stand aside. 8 when left out.
+    /// Families of blocks: only the first so many, from 2, are within reach; the others stand aside. All when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocks: Option<u16>,
     /// A task file of the authors' format in place of drawn tasks, relative to the pipeline file.
@@ -133,7 +133,11 @@ pub struct ModelSpec {
     /// One training run for each.
     #[serde(default = "one_seed")]
     pub seeds: Vec<u64>,
-    /// Train on the first so many training tasks; all when left out.
+    /// For a model of a study: the experiments whose training tasks it learns from, all together. It acts the suites of
+    /// every experiment whose root program it then knows.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub experiments: Vec<String>,
+    /// Train on the first so many training tasks (of each experiment); all when left out.
     #[serde(default)]
     pub train_tasks: Option<u32>,
     /// What it reads as task specification: trajectories, or for variant `ntp` also instructions.
@@ -231,12 +235,18 @@ pub struct SuiteSpec {
     /// Table Clean-up: only tasks with so many bowls; all when left out.
     #[serde(default)]
     pub bowls: Option<u16>,
+    /// Families that build towers: only tasks whose tallest tower has so many things; all when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tallest: Option<u16>,
     /// In which order towers are demonstrated.
     #[serde(default)]
     pub order: OrderSpec,
     /// Knocks towers over after placements; none when left out. For families that build towers.
     #[serde(default)]
     pub adversary: Option<AdversaryConfig>,
+    /// How far the positions that models are told are off, in the demonstration and now; exact when left out.
+    #[serde(default, skip_serializing_if = "ObservationNoise::is_none")]
+    pub noise: ObservationNoise,
     /// Which robot acts: `gripper` or `sawyer`; that of `generate.simulation` when left out. Demonstrations are of that
     /// one always.
     #[serde(default, skip_serializing_if = "Option::is_none")]

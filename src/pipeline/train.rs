@@ -1,4 +1,4 @@
-//! Stage `train`: one model for each variant and seed, from the dataset alone.
+//! Stage `train`: one model for each variant and seed, from the dataset alone; a study's own models from several.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -6,10 +6,10 @@ use serde_json::{Value, json};
 
 use crate::artifact::{IoError, StageDir};
 use crate::dataset::{self, DatasetTrials, LearnedTrials, TrialData};
-use crate::model::{CONFIG_FILE, WEIGHTS_FILE};
+use crate::model::{CONFIG_FILE, CoreKind, WEIGHTS_FILE};
 use crate::pipeline::layout::model_name;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
-use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, gallery, tasks};
+use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, gallery, tasks};
 use crate::task::Split;
 use crate::training::{self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Source, TrialStream};
 
@@ -21,18 +21,44 @@ const VERSION: u32 = 1;
 /// One training of a model.
 #[derive(Clone, Copy)]
 pub(super) struct Model<'p> {
-    pipeline: &'p Pipeline,
+    source: LearnsFrom<'p>,
     pub(super) spec: &'p ModelSpec,
     pub(super) seed: u64,
 }
 
-/// Every model with each of its seeds, in the file's order.
-pub(super) fn units(pipeline: &Pipeline) -> Vec<Model<'_>> {
-    let models = pipeline.spec.models.iter();
-    models.flat_map(|spec| spec.seeds.iter().map(move |&seed| Model { pipeline, spec, seed })).collect()
+/// What a model learns from.
+#[derive(Clone, Copy)]
+enum LearnsFrom<'p> {
+    /// The experiment that it stands in.
+    Experiment(&'p Pipeline),
+    /// Those experiments of a study that it names.
+    Study(&'p Study),
 }
 
-impl Model<'_> {
+/// Every model with each of its seeds, in the file's order.
+pub(super) fn units(pipeline: &Pipeline) -> Vec<Model<'_>> {
+    models(LearnsFrom::Experiment(pipeline), &pipeline.spec.models)
+}
+
+/// The same of a study's own models.
+pub(super) fn units_of_study(study: &Study) -> Vec<Model<'_>> {
+    models(LearnsFrom::Study(study), &study.spec.models)
+}
+
+fn models<'p>(source: LearnsFrom<'p>, specs: &'p [ModelSpec]) -> Vec<Model<'p>> {
+    let of_spec = |spec: &'p ModelSpec| spec.seeds.iter().map(move |&seed| Model { source, spec, seed });
+    specs.iter().flat_map(of_spec).collect()
+}
+
+impl<'p> Model<'p> {
+    /// The experiments that it learns from.
+    fn experiments(&self) -> Vec<&'p Pipeline> {
+        match self.source {
+            LearnsFrom::Experiment(pipeline) => vec![pipeline],
+            LearnsFrom::Study(study) => study.learned_by(self.spec).collect(),
+        }
+    }
+
     /// The model's folder.
     pub(super) fn folder_name(&self) -> String {
         model_name(self.spec, self.seed)
@@ -40,8 +66,21 @@ impl Model<'_> {
 
     /// How many training tasks it learns from.
     pub(super) fn train_tasks(&self) -> u32 {
-        let all = self.pipeline.spec.tasks.train;
+        self.experiments().into_iter().map(|pipeline| self.train_tasks_of(pipeline)).sum()
+    }
+
+    /// How many of an experiment.
+    fn train_tasks_of(&self, pipeline: &Pipeline) -> u32 {
+        let all = pipeline.spec.tasks.train;
         self.spec.train_tasks.map_or(all, |asked| asked.min(all))
+    }
+
+    /// An experiment's run directory, from that which the model lies in.
+    fn run_of(&self, pipeline: &Pipeline, run: &RunDir) -> RunDir {
+        match self.source {
+            LearnsFrom::Experiment(_) => run.clone(),
+            LearnsFrom::Study(_) => run.of_study().experiment(&pipeline.spec.name),
+        }
     }
 
     /// What a finished training leaves; checkpoints are not part of it.
@@ -65,7 +104,10 @@ impl Unit for Model<'_> {
     }
 
     fn dir(&self, run: &RunDir) -> StageDir {
-        run.model(&self.folder_name())
+        match self.source {
+            LearnsFrom::Experiment(_) => run.model(&self.folder_name()),
+            LearnsFrom::Study(_) => run.of_study().model(&self.folder_name()),
+        }
     }
 
     fn amount(&self, _shard: u32) -> Amount {
@@ -74,7 +116,14 @@ impl Unit for Model<'_> {
     }
 
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
-        Ok(BTreeMap::from([(Stage::Convert.name().to_owned(), run.dataset().version()?)]))
+        let input = |pipeline: &Pipeline| {
+            let name = match self.source {
+                LearnsFrom::Experiment(_) => Stage::Convert.name().to_owned(),
+                LearnsFrom::Study(_) => format!("{}: {}", pipeline.spec.name, Stage::Convert),
+            };
+            Ok((name, self.run_of(pipeline, run).dataset().version()?))
+        };
+        self.experiments().into_iter().map(input).collect()
     }
 
     fn settings(&self) -> Value {
@@ -86,6 +135,13 @@ impl Unit for Model<'_> {
         });
         if self.spec.variant.detects() {
             settings["detector_given"] = json!("gripper");
+        }
+        if let LearnsFrom::Study(_) = self.source {
+            settings["experiments"] = json!(self.spec.experiments);
+        }
+        let learns_calls = self.spec.core() != CoreKind::Reactive && self.spec.scoping().has_scopes();
+        if learns_calls && self.spec.training(self.seed).resolved().config.recovery_states > Some(0.0) {
+            settings["recovery"] = json!("within calls");
         }
         settings
     }
@@ -137,14 +193,17 @@ impl Worker for Trainer<'_> {
         let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &should_stop };
         let on = job.context.options.device;
         let mut train = |source: Source<'_>| training::train_from(on, &training, source, job.dir.path(), &mut hooks);
-        let sees = unit.spec.variant.sees();
+        let sees = match unit.source {
+            LearnsFrom::Experiment(pipeline) if unit.spec.variant.sees() => Some(pipeline),
+            LearnsFrom::Experiment(_) | LearnsFrom::Study(_) => None,
+        };
         let summary = match trials {
             Trials::Here(data) => {
-                let gallery = sees.then(|| gallery::open(unit.pipeline, job.context.dir, data)).transpose()?;
+                let gallery = sees.map(|pipeline| gallery::open(pipeline, job.context.dir, data)).transpose()?;
                 train(Source::Here(data, gallery.as_ref().map(|gallery| gallery as &dyn Gallery)))
             }
             Trials::Streamed(stream) => {
-                let galleries = sees.then(|| gallery::OfBuffers::new(unit.pipeline, job.context.dir));
+                let galleries = sees.map(|pipeline| gallery::OfBuffers::new(pipeline, job.context.dir));
                 train(Source::Streamed(stream, galleries.as_ref().map(|galleries| galleries as &dyn Galleries)))
             }
         };
@@ -163,21 +222,37 @@ impl Worker for Trainer<'_> {
     }
 }
 
-/// The trials a model may train on: successful ones of the first training tasks. A detector looks at all of them, so that
-/// they are always in memory; pictures never are.
+/// The trials a model may train on: successful ones of the first training tasks. A detector looks at all of them, and a
+/// study's own model learns from several datasets at once, so that theirs are always in memory; pictures never are.
 fn training_trials(unit: &Model<'_>, job: &Job<'_>) -> Result<Trials, PipelineError> {
     let run = job.context.dir;
-    let allowed: Vec<String> = tasks::training(unit.pipeline, run)?.into_iter().map(|task| task.id).collect();
-    let allowed: HashSet<&String> = allowed[..unit.train_tasks() as usize].iter().collect();
-    let is_taken = |trial: &TrialData| trial.split == Split::Seen && allowed.contains(&trial.task_id);
-    let most_frames = match (unit.spec.variant.detects(), unit.spec.training.most_frames_in_memory) {
-        (true, _) => u64::MAX,
-        (false, asked) => asked.unwrap_or(MOST_FRAMES),
+    let of_experiment = |pipeline: &Pipeline, most_frames: u64| {
+        let run = unit.run_of(pipeline, run);
+        let allowed: Vec<String> = tasks::training(pipeline, &run)?.into_iter().map(|task| task.id).collect();
+        let allowed: HashSet<&String> = allowed[..unit.train_tasks_of(pipeline) as usize].iter().collect();
+        let is_taken = |trial: &TrialData| trial.split == Split::Seen && allowed.contains(&trial.task_id);
+        let folder = job.dir.path();
+        std::fs::create_dir_all(folder).map_err(IoError::system("make", folder))?;
+        Ok::<_, PipelineError>(
+            match dataset::read_learned_trials(run.dataset().path(), is_taken, most_frames, folder)? {
+                LearnedTrials::Here(data) => Trials::Here(data),
+                LearnedTrials::OnDisk(spool) => Trials::Streamed(TrialStream::new(spool, most_frames)?),
+            },
+        )
     };
-    let folder = job.dir.path();
-    std::fs::create_dir_all(folder).map_err(IoError::system("make", folder))?;
-    Ok(match dataset::read_learned_trials(run.dataset().path(), is_taken, most_frames, folder)? {
-        LearnedTrials::Here(data) => Trials::Here(data),
-        LearnedTrials::OnDisk(spool) => Trials::Streamed(TrialStream::new(spool, most_frames)?),
-    })
+    if let LearnsFrom::Experiment(pipeline) = unit.source {
+        let most_frames = match (unit.spec.variant.detects(), unit.spec.training.most_frames_in_memory) {
+            (true, _) => u64::MAX,
+            (false, asked) => asked.unwrap_or(MOST_FRAMES),
+        };
+        return of_experiment(pipeline, most_frames);
+    }
+    let mut datasets = Vec::new();
+    for pipeline in unit.experiments() {
+        // Of so many frames none are left on disk.
+        if let Trials::Here(data) = of_experiment(pipeline, u64::MAX)? {
+            datasets.push(data);
+        }
+    }
+    Ok(Trials::Here(DatasetTrials::together(datasets)))
 }

@@ -31,6 +31,9 @@ pub(super) const COLUMNS: [(&str, DataType); 13] = [
     ("robot", DataType::String),
 ];
 
+/// What a file does not say of itself: how far positions were off.
+pub(super) const NOISE: [&str; 2] = ["noise_frame_m", "noise_offset_m"];
+
 /// What a suite asks for. A fact is null where the suite has no such thing, where its episodes differ in it, and where
 /// it was not written down: then `family` is null too.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -64,6 +67,12 @@ pub struct SuiteFacts {
     /// Which robot acts, where it is not the gripper that flies freely.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
+    /// Standard deviation of the error of each observed position, anew in each observation, in metres; null without noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_frame_m: Option<f64>,
+    /// Standard deviation of an error that stays the same, in metres; null without noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_offset_m: Option<f64>,
 }
 
 /// What a suite of the paper asks for, whichever the family.
@@ -77,6 +86,8 @@ pub(super) enum Ask {
     Topology,
     /// An adversary pushes.
     Adversary,
+    /// Tasks that were not trained on, with positions that are off.
+    Noise,
 }
 
 impl SuiteFacts {
@@ -94,6 +105,7 @@ impl SuiteFacts {
         let (demonstrated_min, demonstrated_max) = (whole("demonstrated_min")?, whole("demonstrated_max")?);
         let (on_table_min, on_table_max) = (whole("on_table_min")?, whole("on_table_max")?);
         let (blocks, bowls) = (whole("blocks")?, whole("bowls")?);
+        let [noise_frame_m, noise_offset_m] = [real(NOISE[0])?, real(NOISE[1])?];
         let (objects_min, objects_max) = (rows.optional_whole("objects")?, rows.optional_whole(&highest("objects"))?);
         let facts = |row: usize| Self {
             split: split[row].take(),
@@ -110,6 +122,8 @@ impl SuiteFacts {
             objects_min: objects_min[row],
             objects_max: objects_max[row],
             robot: robot[row].take().filter(|robot| robot != RobotKind::default().name()),
+            noise_frame_m: noise_frame_m[row].filter(|noise| *noise > 0.0),
+            noise_offset_m: noise_offset_m[row].filter(|noise| *noise > 0.0),
         };
         Ok((0..blocks.len()).map(facts).collect())
     }
@@ -121,6 +135,7 @@ impl SuiteFacts {
         }
         let split = self.split.as_deref()?;
         Some(match self.order.as_deref()? {
+            _ if self.noise_frame_m.or(self.noise_offset_m).is_some() => Ask::Noise,
             _ if self.adversary_probability? > 0.0 => Ask::Adversary,
             "own" if split == Split::Unseen.name() => Ask::Unseen,
             "own" => Ask::Seen,
@@ -158,6 +173,11 @@ impl SuiteFacts {
         self.adversary_impulse_ns.map(|impulse| (1000.0 * impulse).round() as i64)
     }
 
+    /// Standard deviations of what is off, anew in each observation and always, in millimetres.
+    pub(super) fn noise_mm(&self) -> [i64; 2] {
+        [self.noise_frame_m, self.noise_offset_m].map(|noise| noise.map_or(0, |noise| (1000.0 * noise).round() as i64))
+    }
+
     /// In a few words: `Block Stacking, 4 blocks, unseen tasks, a push at 25 %`. Empty where nothing is known.
     pub(super) fn words(&self) -> String {
         let Some(family) = &self.family else { return String::new() };
@@ -170,6 +190,9 @@ impl SuiteFacts {
         let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
         words.extend(push.map(|(percent, mns)| format!("a push of {mns} mN\u{202f}s at {percent} %")));
         words.extend(self.robot.as_deref().map(|robot| format!("acted by {}", capitalized(robot))));
+        let [frame, offset] = self.noise_mm();
+        words.extend((frame > 0).then(|| format!("positions off by {frame} mm")));
+        words.extend((offset > 0).then(|| format!("positions always off by {offset} mm")));
         if !self.shows_what_is_there() {
             words.push("more on the table than was shown".to_owned());
         }

@@ -14,7 +14,7 @@ pub(super) use definitions::USUAL_PUSH;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::actor::ModelParts;
+use crate::report::actor::{Actor, ModelParts};
 use crate::report::facts::{Ask, TABLE_CLEANUP};
 use crate::report::figures::definitions::{DEFINITIONS, Definition, asks};
 use crate::report::order;
@@ -45,6 +45,9 @@ pub struct Series {
     /// Its parts.
     #[serde(flatten)]
     pub parts: ModelParts,
+    /// Whether it was trained otherwise on purpose: the variant's name tells how.
+    #[serde(skip)]
+    pub is_tagged: bool,
     /// Ours, by rising quantity.
     pub ours: Vec<Point>,
     /// The paper's, beside those of ours that meet its conditions.
@@ -103,8 +106,9 @@ pub struct GridCell {
 
 /// Those figures of each experiment that its rollouts have enough points of.
 pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
-    let experiments = experiments(aggregates);
+    let (papers, all) = (experiments(aggregates), experiments_of(aggregates, |actor| actor.is_demonstrated()));
     let of_definition = |definition: &'static Definition| {
+        let experiments = if definition.shows_tagged { &all } else { &papers };
         let figures = experiments.iter().map(|rows| figure(definition, rows));
         figures.filter(|figure| (definition.is_worth_it)(figure)).collect::<Vec<_>>()
     };
@@ -114,7 +118,12 @@ pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
 /// The rows of each experiment that stand for a model of the paper, in order of models: of each the most training tasks
 /// and the first decoder come first.
 pub(super) fn experiments(aggregates: &[Aggregate]) -> Vec<Vec<&Aggregate>> {
-    let stands = |row: &&Aggregate| row.actor.is_the_papers() && !row.actor.is_oracle();
+    experiments_of(aggregates, Actor::is_the_papers)
+}
+
+/// The same of the models that are chosen.
+fn experiments_of(aggregates: &[Aggregate], is_chosen: fn(&Actor) -> bool) -> Vec<Vec<&Aggregate>> {
+    let stands = |row: &&Aggregate| is_chosen(&row.actor) && !row.actor.is_oracle();
     let mut rows: Vec<&Aggregate> = aggregates.iter().filter(stands).collect();
     rows.sort_by_cached_key(|row| (order::actor(&row.actor), order::suite(&row.suite, &row.facts)));
     rows.chunk_by(|a, b| a.actor.experiment == b.actor.experiment).map(<[_]>::to_vec).collect()
@@ -123,7 +132,7 @@ pub(super) fn experiments(aggregates: &[Aggregate]) -> Vec<Vec<&Aggregate>> {
 fn figure(definition: &Definition, rows: &[&Aggregate]) -> Figure {
     let placed = |row: &&'_ Aggregate| (definition.x)(row).is_some();
     let rows: Vec<&Aggregate> = rows.iter().copied().filter(placed).collect();
-    let models = rows.chunk_by(|a, b| a.actor.variant == b.actor.variant);
+    let models = rows.chunk_by(|a, b| (&a.actor.variant, &a.actor.tag) == (&b.actor.variant, &b.actor.tag));
     let series: Vec<Series> = models.map(|rows| series(definition, rows)).collect();
     let is_beside = series.iter().any(|series| !series.paper.is_empty());
     Figure {
@@ -157,8 +166,9 @@ fn series(definition: &Definition, rows: &[&Aggregate]) -> Series {
     };
     let paper = |(x, row): &(i64, &Aggregate)| Some(PaperPoint { x: *x, success_rate: row.paper_success_rate? });
     Series {
-        variant: rows[0].actor.variant.clone(),
+        variant: rows[0].actor.model(),
         parts: rows[0].actor.parts.clone(),
+        is_tagged: rows[0].actor.tag.is_some(),
         ours: placed.iter().map(point).collect(),
         paper: placed.iter().filter_map(paper).collect(),
     }

@@ -63,7 +63,8 @@ pub(super) fn suite(name: &str, facts: &SuiteFacts) -> impl Ord + use<> {
     let family = known.unwrap_or(Family::ALL.len());
     let push = (facts.push_percent(), facts.push_mns());
     let instances = (!facts.shows_what_is_there(), facts.bowls, facts.on_table_min, facts.on_table_max);
-    (family, facts.ask().map_or((true, None), |ask| (false, Some(ask))), push, instances, natural(name))
+    let ask = facts.ask().map_or((true, None), |ask| (false, Some(ask)));
+    (family, ask, facts.noise_mm(), push, instances, natural(name))
 }
 
 /// Programs from the root down; other names behind.

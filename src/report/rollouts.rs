@@ -20,6 +20,7 @@ use crate::report::frames::{Rows, collect, scan, scan_with};
 use crate::report::interval::wilson;
 use crate::report::summary::{Divergence, FirstError, SuiteResult};
 use crate::report::{ReportError, order};
+use crate::trace::ObservationNoise;
 
 const COLUMNS: [(&str, DataType); 17] = [
     ("variant", DataType::String),
@@ -61,12 +62,14 @@ const MICROS_PER_SEC: f64 = 1e6;
 const MILLIONTHS: i64 = 1_000_000;
 
 /// The rollouts of one model in one suite.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RolloutsInput {
     /// Of which experiment.
     pub experiment: String,
     /// What tells the model apart from others of its variant.
     pub tag: Option<String>,
+    /// How far the positions that it was told were off.
+    pub noise: ObservationNoise,
     /// Its rollouts.parquet.
     pub path: PathBuf,
 }
@@ -91,7 +94,10 @@ pub(super) fn read(inputs: &[RolloutsInput]) -> Result<Rollouts, ReportError> {
     let frames = inputs.iter().map(|input| {
         let experiment = lit(input.experiment.clone()).alias(EXPERIMENT);
         let tag = input.tag.clone().map_or_else(|| lit(NULL).cast(DataType::String), lit).alias(TAG);
-        Ok(scan_with(&input.path, &COLUMNS, &later)?.with_columns([experiment, tag]))
+        let ObservationNoise { frame_m, offset_m } = input.noise;
+        let [frame, offset] = [(facts::NOISE[0], frame_m), (facts::NOISE[1], offset_m)]
+            .map(|(name, noise_m)| lit(f64::from(noise_m)).alias(name));
+        Ok(scan_with(&input.path, &COLUMNS, &later)?.with_columns([experiment, tag, frame, offset]))
     });
     let frames = frames.collect::<Result<Vec<_>, ReportError>>()?;
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
@@ -164,7 +170,7 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         col("goals_met").count().alias("judged"),
         met.sum().alias("met"),
     ];
-    for (name, _) in facts::COLUMNS {
+    for name in facts::COLUMNS.into_iter().map(|(name, _)| name).chain(facts::NOISE) {
         sums.extend([col(name).min(), col(name).max().alias(facts::highest(name))]);
     }
     let by = key(&["suite", "training_seed"]);

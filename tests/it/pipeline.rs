@@ -396,6 +396,36 @@ fn a_suite_that_asks_for_more_than_the_table_holds_is_refused_with_what_is_allow
 }
 
 #[test]
+fn settings_of_networks_and_noise_that_cannot_be_are_refused_with_what_is_allowed() {
+    let training = |more: &'static str| move |text: &str| text.replace("steps = 6", &format!("steps = 6\n{more}"));
+    check_refused(training("scope_kernel = 4"), "models[0].training", "scope_kernel is 4; allowed: odd numbers");
+    check_refused(training("relations = true"), "models[0].training", "relations is on for variant ntp");
+    check_refused(
+        training("merge_aside_m = 0.2"),
+        "models[0].training",
+        "merge_aside_m is 0.2; allowed: from 0 to 0.1",
+    );
+    let allowed = "noise.frame_m is -0.01; allowed: from 0 to 0.1";
+    check_refused(training("noise = { frame_m = -0.01 }"), "models[0].training", allowed);
+    let suite = |more: &'static str| move |text: &str| text.replace("episodes = 4", &format!("episodes = 4\n{more}"));
+    let key = "rollout.suites[0].noise";
+    check_refused(suite("noise = { offset_m = nan }"), key, "offset_m is NaN; allowed: from 0 to 0.1");
+    check_refused(suite("noise = { frame_m = inf }"), key, "frame_m is inf; allowed: from 0 to 0.1");
+    check_refused(suite("noise = { sigma = 0.1 }"), "sigma", "frame_m");
+    let building = |blocks: &'static str| {
+        move |text: &str| {
+            text.replace("block_stacking", "tower_building").replace("unseen = 4", &format!("unseen = 4\n{blocks}"))
+        }
+    };
+    check_refused(building("blocks = 17"), "tasks.blocks", "is 17; allowed is 2 to 16");
+    let sorted = |text: &str| {
+        let text = text.replace("block_stacking", "object_sorting").replace("train = 3", "train = 4");
+        text.replace("episodes = 4", "episodes = 4\ntallest = 3")
+    };
+    check_refused(sorted, "rollout.suites[0].tallest", "builds no towers");
+}
+
+#[test]
 fn a_pipeline_that_is_not_there_is_a_usage_error_with_its_path() {
     let error = Pipeline::load(Path::new("no/such.toml")).unwrap_err();
     assert!(matches!(error, PipelineError::Syntax { .. }));

@@ -7,6 +7,7 @@ use ntp::report::{
     DetectionsInput, Fact, Figure, InSight, MetricsInput, ModelParts, ModelSummary, ReportInputs, RolloutsInput,
     Series, StageCost, Verdict, json_schema, make, paper_values,
 };
+use ntp::trace::ObservationNoise;
 use polars::prelude::{Column, DataFrame, DataType, ParquetWriter, df};
 use serde_json::{Value, json};
 
@@ -231,7 +232,7 @@ fn model() -> ModelSummary {
 }
 
 fn input(path: PathBuf) -> RolloutsInput {
-    RolloutsInput { experiment: "ten".to_owned(), tag: None, path }
+    RolloutsInput { experiment: "ten".to_owned(), tag: None, noise: ObservationNoise::default(), path }
 }
 
 /// A run directory with ten rollouts in one file and one training.

@@ -4,8 +4,8 @@ use crate::model;
 use crate::pipeline::costs::{Costs, UnitCost};
 use crate::pipeline::filmstrips::{self, Rollouts};
 use crate::pipeline::report::{Report, annotations};
-use crate::pipeline::unit::{Job, Made, Unit as _, Worker};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, detections, rollout, tasks, train, upstream};
+use crate::pipeline::unit::{Job, Made, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, detections, rollout, tasks, train, upstream};
 use crate::render::{CameraConfig, Randomization};
 use crate::report::{
     self, AnnotationsInput, DetectionsInput, Fact, Filmstrip, MetricsInput, ModelParts, ModelSummary, ReportInputs,
@@ -30,8 +30,11 @@ impl<'j> Reporter<'j> {
         let mut inputs =
             ReportInputs { title: report.title.to_owned(), paper: paper_values(), ..ReportInputs::default() };
         for (pipeline, run) in report.runs(job.context.dir) {
-            gather(pipeline, &run, &mut inputs)?;
-            inputs.filmstrips.extend(filmstrips(pipeline, &run, job.context.dir)?);
+            gather(pipeline, &run, report.acted(pipeline), &mut inputs)?;
+            inputs.filmstrips.extend(filmstrips(pipeline, &run, report.acted(pipeline), job.context.dir)?);
+        }
+        if let Some(study) = report.study {
+            gather_models(study, job.context.dir, &mut inputs)?;
         }
         inputs.commits.sort();
         inputs.commits.dedup();
@@ -47,13 +50,19 @@ impl Worker for Reporter<'_> {
 }
 
 /// Adds all that is known of one experiment.
-fn gather(pipeline: &Pipeline, run: &RunDir, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
+fn gather(
+    pipeline: &Pipeline,
+    run: &RunDir,
+    acted: Vec<rollout::Suite<'_>>,
+    inputs: &mut ReportInputs,
+) -> Result<(), PipelineError> {
     let experiment = &pipeline.spec.name;
-    for unit in rollout::units(pipeline) {
+    for unit in acted {
         let dir = unit.dir(run);
         inputs.rollouts.push(RolloutsInput {
             experiment: experiment.clone(),
             tag: unit.actor.and_then(|actor| actor.model.spec.tag.clone()),
+            noise: unit.spec.noise,
             path: dir.path().join(rollout::TABLE),
         });
         if dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
@@ -66,22 +75,40 @@ fn gather(pipeline: &Pipeline, run: &RunDir, inputs: &mut ReportInputs) -> Resul
         AnnotationsInput { experiment, name, path }
     }));
     let costs = Costs::read(run)?;
-    inputs.metrics.extend(trainings(pipeline, run, &costs)?);
+    inputs.metrics.extend(trainings(experiment, train::units(pipeline), run, &costs)?);
     inputs.facts.extend(facts(pipeline, run)?);
     inputs.costs.extend(stage_costs(pipeline, run, &costs, &mut inputs.commits)?);
     Ok(())
 }
 
+/// Adds what a study's own models learned, and what that took.
+fn gather_models(study: &Study, run: &RunDir, inputs: &mut ReportInputs) -> Result<(), PipelineError> {
+    let models = train::units_of_study(study);
+    if models.is_empty() {
+        return Ok(());
+    }
+    let costs = Costs::read(run)?;
+    let cost = stage_cost(&study.spec.name, Stage::Train, &upstream::boxed(models.clone()), run, &costs)?;
+    inputs.commits.extend(cost.commits);
+    inputs.costs.extend(cost.told.cpu_secs.is_some().then_some(cost.told));
+    inputs.metrics.extend(trainings(&study.spec.name, models, run, &costs)?);
+    Ok(())
+}
+
 /// Strips of what models acted; of the oracle only where there is nothing else. `whole` is the run directory of the
 /// report.
-fn filmstrips(pipeline: &Pipeline, run: &RunDir, whole: &RunDir) -> Result<Vec<Filmstrip>, PipelineError> {
+fn filmstrips(
+    pipeline: &Pipeline,
+    run: &RunDir,
+    acted: Vec<rollout::Suite<'_>>,
+    whole: &RunDir,
+) -> Result<Vec<Filmstrip>, PipelineError> {
     let of_unit = |unit: rollout::Suite<'_>| {
         let dir = unit.dir(run);
         let place = dir.path().strip_prefix(whole.root()).unwrap_or(dir.path()).display().to_string();
         Rollouts { suite: unit.spec.name.clone(), actor: unit.actor_name(), dir, place }
     };
-    let (models, oracle): (Vec<_>, Vec<_>) =
-        rollout::units(pipeline).into_iter().partition(|unit| unit.actor.is_some());
+    let (models, oracle): (Vec<_>, Vec<_>) = acted.into_iter().partition(|unit| unit.actor.is_some());
     let shown = if models.is_empty() { oracle } else { models };
     let shown: Vec<Rollouts> = shown.into_iter().map(of_unit).collect();
     filmstrips::of_experiment(&pipeline.spec.name, &tasks::read(run)?, &shown)
@@ -93,13 +120,18 @@ fn parts(facts: ModelFacts) -> ModelParts {
     ModelParts { core, scoping, encoder }
 }
 
-fn trainings(pipeline: &Pipeline, run: &RunDir, costs: &Costs) -> Result<Vec<MetricsInput>, PipelineError> {
+fn trainings(
+    experiment: &str,
+    models: Vec<train::Model<'_>>,
+    run: &RunDir,
+    costs: &Costs,
+) -> Result<Vec<MetricsInput>, PipelineError> {
     let mut trainings = Vec::new();
-    for unit in train::units(pipeline) {
+    for unit in models {
         let (spec, dir) = (unit.spec, unit.dir(run));
         let plan = dir.plan()?;
         let model = ModelSummary {
-            experiment: pipeline.spec.name.clone(),
+            experiment: experiment.to_owned(),
             variant: spec.variant.name(),
             parts: parts(ModelFacts::from(spec.variant)),
             tag: spec.tag.clone(),
@@ -123,24 +155,41 @@ fn stage_costs(
 ) -> Result<Vec<StageCost>, PipelineError> {
     let mut told = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|&stage| stage != Stage::Report) {
-        let units = upstream::units(pipeline, stage);
-        let mut known = Vec::new();
-        for unit in &units {
-            let plan = unit.dir(run).plan()?;
-            known.extend(plan.and_then(|plan| costs.of(&unit.name(), &plan)));
-        }
-        commits.extend(known.iter().filter_map(|cost| cost.commit.clone()));
-        let is_known = known.len() == units.len();
-        let sum = |of: fn(&UnitCost) -> f64| is_known.then(|| known.iter().map(of).sum());
-        told.push(StageCost {
-            experiment: pipeline.spec.name.clone(),
-            stage: stage.name().to_owned(),
-            cpu_secs: sum(|cost| cost.cpu_secs),
-            wall_secs: sum(|cost| cost.wall_secs),
-        });
+        let cost = stage_cost(&pipeline.spec.name, stage, &upstream::units(pipeline, stage), run, costs)?;
+        commits.extend(cost.commits);
+        told.push(cost.told);
     }
     let is_measured = told.iter().any(|cost| cost.cpu_secs.is_some());
     Ok(if is_measured { told } else { Vec::new() })
+}
+
+/// What a stage took, and of which commits its pipeline file was.
+struct OfStage {
+    told: StageCost,
+    commits: Vec<String>,
+}
+
+fn stage_cost(
+    experiment: &str,
+    stage: Stage,
+    units: &[Box<dyn Unit + '_>],
+    run: &RunDir,
+    costs: &Costs,
+) -> Result<OfStage, PipelineError> {
+    let mut known = Vec::new();
+    for unit in units {
+        let plan = unit.dir(run).plan()?;
+        known.extend(plan.and_then(|plan| costs.of(&unit.name(), &plan)));
+    }
+    let is_known = known.len() == units.len();
+    let sum = |of: fn(&UnitCost) -> f64| is_known.then(|| known.iter().map(of).sum());
+    let told = StageCost {
+        experiment: experiment.to_owned(),
+        stage: stage.name().to_owned(),
+        cpu_secs: sum(|cost| cost.cpu_secs),
+        wall_secs: sum(|cost| cost.wall_secs),
+    };
+    Ok(OfStage { told, commits: known.iter().filter_map(|cost| cost.commit.clone()).collect() })
 }
 
 /// What a reader wants to know of an experiment beside its results.

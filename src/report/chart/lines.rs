@@ -26,7 +26,7 @@ pub(in crate::report) struct LinePlot {
 pub(in crate::report) struct PlotLine {
     pub(in crate::report) label: String,
     pub(in crate::report) color: usize,
-    /// Whether it has the paper's encoder.
+    /// Whether it has the paper's encoder, or was trained otherwise on purpose.
     pub(in crate::report) dashed: bool,
     pub(in crate::report) path: String,
     pub(in crate::report) dots: Vec<PlotDot>,
@@ -130,7 +130,7 @@ fn line(series: &Series, places: &Places, shift: f64) -> PlotLine {
     PlotLine {
         label: series.variant.clone(),
         color: series.parts.color(false),
-        dashed: series.parts.has_papers_encoder(),
+        dashed: series.parts.has_papers_encoder() || series.is_tagged,
         path: path(dots.iter().map(|dot| (&dot.x, &dot.y))),
         dots,
     }

@@ -47,7 +47,7 @@ fn fill(of: &Contents<'_>) -> Figures {
 
 /// A line for each colour, named by the first model that has it: one without the paper's encoder, if there is any.
 fn figure_keys<'a>(series: impl Iterator<Item = &'a Series>) -> Vec<Key> {
-    let mut series: Vec<&Series> = series.collect();
+    let mut series: Vec<&Series> = series.filter(|one| !one.is_tagged).collect();
     series.sort_by_cached_key(|one| order::model(&one.variant, &one.parts, false));
     let keys = series.into_iter().map(|one| Key { hollow: false, ..Key::of_model(&one.variant, &one.parts) });
     once_each(keys, |a, b| a.color == b.color)
