@@ -3,10 +3,11 @@
 use ntp::model::ScopingKind;
 use ntp::program::Program;
 use ntp::robot::{Action, RobotApi};
-use ntp::rollout::{Decision, Limits, Oracle, Policy, PolicyError, Query, RolloutEpisode, Start, run};
+use ntp::rollout::{Decision, Limits, Noisy, Oracle, Policy, PolicyError, Query, RolloutEpisode, Start, run};
 use ntp::scene::{BodyIndex, Scene, SceneState, SlotIndex};
+use ntp::seed::Seed;
 use ntp::task::{Split, Task};
-use ntp::trace::{Actor, Cause, Frame, Outcome, Provenance};
+use ntp::trace::{Actor, Cause, Frame, ObservationNoise, Outcome, Provenance};
 
 use crate::kinematic::{KinematicWorld, cleanup, demonstration, sorting, tower, trial};
 
@@ -50,6 +51,25 @@ fn an_oracle_cleans_up_more_forks_than_were_demonstrated() {
     let task = cleanup("c", &[1, 3], Split::Unseen);
     let rollouts = check_oracle(vec![start(&task, 1, 20)]);
     assert_eq!(rollouts[0].decisions, 7 * (2 + 20) + 1);
+}
+
+#[test]
+fn a_policy_behind_noise_is_told_positions_that_are_off_and_the_same_each_time() {
+    let task = tower("t", &[4, 1, 6, 2], Split::Unseen);
+    let acted = |frame_m, offset_m| {
+        let starts = vec![start(&task, 1, 1)];
+        let oracle = Box::new(Oracle::for_starts(&starts));
+        let mut policy = Noisy::new(oracle, ObservationNoise { frame_m, offset_m }, vec![Seed(7)]);
+        run(&mut policy, starts, Limits::default()).unwrap().remove(0)
+    };
+    let exact = acted(0.0, 0.0);
+    assert_eq!((exact.episode.outcome, exact.decisions), (Outcome::Success, 7 * 3 + 1));
+    for (frame_m, offset_m) in [(0.1, 0.0), (0.0, 0.1)] {
+        let off = acted(frame_m, offset_m);
+        assert_eq!(off, acted(frame_m, offset_m));
+        // It takes what stands for fallen, and builds it again and again.
+        assert_eq!(off.episode.outcome, Outcome::Failure(Cause::NeverEnded));
+    }
 }
 
 /// The world of a trial, but the last body falls off the tray when it is carried.
