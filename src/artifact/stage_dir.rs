@@ -270,6 +270,15 @@ impl StageDir {
         manifest.files.iter().try_for_each(|file| self.check_file(file, deep))
     }
 
+    /// Compares the files, by hash, with the manifest, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As [`StageDir::check_files`].
+    pub fn check_whole(&self) -> Result<(), ContractError> {
+        self.manifest()?.map_or(Ok(()), |manifest| self.check_files(&manifest, true))
+    }
+
     /// Compares one file with what a manifest says of it, as [`StageDir::check_files`] does.
     ///
     /// # Errors

@@ -46,6 +46,10 @@ impl Unit for Dataset<'_> {
         Amount { count: u64::from(spec.tasks.train) * u64::from(spec.generate.trials_per_task), of: "episodes" }
     }
 
+    fn reads(&self, run: &RunDir) -> Vec<StageDir> {
+        vec![run.recordings()]
+    }
+
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         Ok(BTreeMap::from([(Stage::Generate.name().to_owned(), run.recordings().version()?)]))
     }
@@ -61,7 +65,6 @@ impl Unit for Dataset<'_> {
     fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
         let recordings = job.context.dir.recordings();
         let manifest = recordings.finished()?;
-        recordings.check_files(&manifest, true)?;
         Ok(Box::new(Converter { config: &self.0.spec.convert, job, recordings, manifest }))
     }
 }

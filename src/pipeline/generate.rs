@@ -65,6 +65,10 @@ impl Unit for Demonstrated<'_> {
         Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
     }
 
+    fn reads(&self, run: &RunDir) -> Vec<StageDir> {
+        vec![run.tasks()]
+    }
+
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         tasks::version(run)
     }

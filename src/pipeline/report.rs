@@ -74,6 +74,13 @@ impl Unit for Report<'_> {
         Amount { count: self.experiments.len() as u64, of: "experiments" }
     }
 
+    fn reads(&self, run: &RunDir) -> Vec<StageDir> {
+        let units = |(pipeline, run): (&'_ Pipeline, RunDir)| {
+            rollout::units(pipeline).into_iter().map(|unit| unit.dir(&run)).collect::<Vec<_>>()
+        };
+        self.runs(run).into_iter().flat_map(units).collect()
+    }
+
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         let mut inputs = BTreeMap::new();
         for (pipeline, run) in self.runs(run) {

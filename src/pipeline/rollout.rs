@@ -131,6 +131,11 @@ impl Unit for Suite<'_> {
         Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
     }
 
+    fn reads(&self, run: &RunDir) -> Vec<StageDir> {
+        let model = self.actor.map(|actor| actor.model.dir(run));
+        std::iter::once(run.tasks()).chain(model).collect()
+    }
+
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         let mut inputs = tasks::version(run)?;
         if let Some(actor) = self.actor {

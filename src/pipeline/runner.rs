@@ -1,13 +1,14 @@
 //! Runs stages in order; skips what is up to date, and says why it does not.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::artifact::{ContractError, IoError, LockError, Plan, RunLock, remove_partials};
 use crate::feature::Feature;
 use crate::pipeline::costs::{Costs, Measured};
-use crate::pipeline::unit::{Context, Job, Made, Unit, Worker};
+use crate::pipeline::unit::{Context, Job, Made, Unit, Worker, open};
 use crate::pipeline::{
     Options, Pipeline, PipelineError, RunDir, Scope, Stage, StageReport, Status, Study, report, rollout, shared, train,
     upstream,
@@ -20,6 +21,33 @@ use crate::progress::Stopwatch;
 ///
 /// The first thing that went wrong; what was committed before stays.
 pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+    run_experiment(pipeline, dir, options, &mut ToDo::default())
+}
+
+/// In a dry run: the folders that would be made anew, each with its stage. What reads one of them is to do as well.
+#[derive(Default)]
+struct ToDo(BTreeMap<PathBuf, Stage>);
+
+impl ToDo {
+    /// What comes before a unit, as a reason.
+    fn before(&self, unit: &dyn Unit, run: &RunDir) -> Option<String> {
+        let stage = unit.reads(run).iter().find_map(|dir| self.0.get(dir.path()).copied())?;
+        Some(format!("{stage} comes first"))
+    }
+
+    fn note(&mut self, unit: &dyn Unit, run: &RunDir, report: &StageReport) {
+        if report.status == Status::Needed {
+            self.0.insert(unit.dir(run).path().to_owned(), unit.stage());
+        }
+    }
+}
+
+fn run_experiment(
+    pipeline: &Pipeline,
+    dir: &RunDir,
+    options: &Options,
+    to_do: &mut ToDo,
+) -> Result<Vec<StageReport>, PipelineError> {
     check_scope(pipeline, options)?;
     check_device(options)?;
     let _lock = lock(dir, options)?;
@@ -32,7 +60,7 @@ pub fn run(pipeline: &Pipeline, dir: &RunDir, options: &Options) -> Result<Vec<S
     for stage in Stage::ALL.into_iter().filter(|stage| (options.from..=options.to).contains(stage)) {
         let stage_units = units(pipeline, stage);
         let of_stage = pool.install(|| match options.scope {
-            Scope::Whole => run_units(&context, &pipeline.path, stage_units),
+            Scope::Whole => run_units(&context, &pipeline.path, stage_units, to_do),
             _ => shared::run_units(&context, pipeline, stage_units),
         })?;
         if options.progress && !options.dry_run {
@@ -57,15 +85,15 @@ pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<S
         return Err(PipelineError::Value { path: study.path.clone(), key, problem });
     }
     let _lock = lock(dir, options)?;
-    let mut reports = Vec::new();
+    let (mut reports, mut to_do) = (Vec::new(), ToDo::default());
     for pipeline in &study.experiments {
         let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
-        reports.extend(run(pipeline, &dir.experiment(&pipeline.spec.name), &options)?);
+        reports.extend(run_experiment(pipeline, &dir.experiment(&pipeline.spec.name), &options, &mut to_do)?);
     }
     reports.extend(run_models(study, dir, options)?);
     if options.to == Stage::Report {
         let own = upstream::boxed(vec![report::of_study(study)]);
-        reports.extend(run_units(&Context { dir, options }, &study.path, own)?);
+        reports.extend(run_units(&Context { dir, options }, &study.path, own, &mut to_do)?);
     }
     Ok(reports)
 }
@@ -163,13 +191,19 @@ fn run_units(
     context: &Context<'_>,
     pipeline: &Path,
     units: Vec<Box<dyn Unit + '_>>,
+    to_do: &mut ToDo,
 ) -> Result<Vec<StageReport>, PipelineError> {
     // All are planned before the first is run: what is missing of one is told at once.
     let planned: Result<Vec<(&dyn Unit, Planned)>, PipelineError> =
         units.iter().map(|unit| Ok((unit.as_ref(), Planned::of(context, unit.as_ref())?))).collect();
-    let run = |(unit, planned): (&dyn Unit, Planned)| match planned {
-        Planned::Known(plan) => run_unit(context, pipeline, unit, *plan),
-        Planned::Behind(reason) => Ok(report_of(context, unit, Status::Needed, reason)),
+    let run = |(unit, planned): (&dyn Unit, Planned)| {
+        let planned = to_do.before(unit, context.dir).map_or(planned, Planned::Behind);
+        let report = match planned {
+            Planned::Known(plan) => run_unit(context, pipeline, unit, *plan)?,
+            Planned::Behind(reason) => report_of(context, unit, Status::Needed, reason),
+        };
+        to_do.note(unit, context.dir, &report);
+        Ok(report)
     };
     planned?.into_iter().map(run).collect()
 }
@@ -218,7 +252,7 @@ fn run_unit(context: &Context<'_>, pipeline: &Path, unit: &dyn Unit, plan: Plan)
 
 /// Begins, does and commits a unit.
 fn run_whole(unit: &dyn Unit, job: &Job<'_>, shards: Vec<u32>) -> Result<(), PipelineError> {
-    let worker = unit.open(job)?;
+    let worker = open(unit, job)?;
     if job.context.options.force {
         job.dir.clear()?;
     }

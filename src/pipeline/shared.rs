@@ -15,7 +15,7 @@ use crate::pipeline::costs::Measured;
 use crate::pipeline::failures::Failure;
 use crate::pipeline::items::{ItemRanges, Numbered, number};
 use crate::pipeline::runner::{finish, report_of, run_shard, why_needed};
-use crate::pipeline::unit::{Context, Job, Made, Unit};
+use crate::pipeline::unit::{Context, Job, Made, Unit, open};
 use crate::pipeline::{Options, Pipeline, PipelineError, RunDir, Scope, StageReport, Status};
 use crate::progress::{self, Stopwatch};
 
@@ -218,7 +218,7 @@ impl Items<'_> {
     /// Does shards; what comes of each.
     fn attempt(&self, job: &Job<'_>, shards: &[u32]) -> Vec<Result<Option<Made>, PipelineError>> {
         let unit = self.numbered.unit.as_ref();
-        let worker = match unit.open(job) {
+        let worker = match open(unit, job) {
             Ok(worker) => worker,
             Err(error) => return shards.iter().map(|_| Err(PipelineError::Inputs(error.to_string()))).collect(),
         };

@@ -64,8 +64,7 @@ impl PipelineFile {
     ///
     /// As [`Pipeline::load`] and [`Study::load`].
     pub fn load(path: &Path) -> Result<Self, PipelineError> {
-        let table = read_text(path)?.parse::<toml::Table>();
-        if table.is_ok_and(|table| table.contains_key("experiments")) {
+        if is_study(path)? {
             return Ok(Self::Study(Study::load(path)?));
         }
         Ok(Self::Experiment(Box::new(Pipeline::load(path)?)))
@@ -233,17 +232,21 @@ impl Study {
     }
 }
 
+fn is_study(path: &Path) -> Result<bool, PipelineError> {
+    let table = read_text(path)?.parse::<toml::Table>();
+    Ok(table.is_ok_and(|table| table.contains_key("experiments")))
+}
+
 fn load_experiment(study: &Path, key: &str, file: &str) -> Result<Pipeline, PipelineError> {
     let path = study.parent().unwrap_or(Path::new("")).join(file);
     if !path.is_file() {
         return Err(value(study, key, format!("no such file: {}", path.display())));
     }
-    match PipelineFile::load(&path)? {
-        PipelineFile::Experiment(pipeline) => Ok(*pipeline),
-        PipelineFile::Study(_) => {
-            Err(value(study, key, format!("{} is a study; allowed are files of one experiment", path.display())))
-        }
+    // Looked at before it is read: a study may name itself.
+    if is_study(&path)? {
+        return Err(value(study, key, format!("{} is a study; allowed are files of one experiment", path.display())));
     }
+    Pipeline::load(&path)
 }
 
 fn value(path: &Path, key: &str, problem: String) -> PipelineError {

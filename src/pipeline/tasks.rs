@@ -42,6 +42,10 @@ impl Unit for Tasks<'_> {
         Amount { count: u64::from(self.0.spec.tasks.train) + u64::from(self.0.n_unseen()), of: "tasks" }
     }
 
+    fn reads(&self, _run: &RunDir) -> Vec<StageDir> {
+        Vec::new()
+    }
+
     fn inputs(&self, _run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         Ok(self.0.import_hash()?.map(|hash| ("import".to_owned(), hash)).into_iter().collect())
     }

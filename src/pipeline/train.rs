@@ -115,6 +115,10 @@ impl Unit for Model<'_> {
         Amount { count: u64::from(training.config.n_steps_in_all()), of: "steps" }
     }
 
+    fn reads(&self, run: &RunDir) -> Vec<StageDir> {
+        vec![run.dataset()]
+    }
+
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
         let input = |pipeline: &Pipeline| {
             let name = match self.source {

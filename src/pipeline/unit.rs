@@ -34,6 +34,9 @@ pub(super) trait Unit: Send + Sync {
     /// How much work a shard is.
     fn amount(&self, shard: u32) -> Amount;
 
+    /// The folders that it reads.
+    fn reads(&self, run: &RunDir) -> Vec<StageDir>;
+
     /// What it reads: hash by the stage's name.
     ///
     /// # Errors
@@ -93,6 +96,18 @@ impl Made {
         let files: Result<_, _> = files.into_iter().map(|file| FileEntry::of(dir.path(), file)).collect();
         Ok(Self { episodes: 0, failed: 0, files: files?, told: None })
     }
+}
+
+/// Opens a unit once every file that it reads is, by its hash, as it was made: nothing is made of what was damaged.
+///
+/// # Errors
+///
+/// [`crate::artifact::ContractError::FileDiffers`] for the first file that is not, and those of the unit itself.
+pub(super) fn open<'j>(unit: &'j dyn Unit, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
+    for dir in unit.reads(job.context.dir) {
+        dir.check_files(&dir.finished()?, true)?;
+    }
+    unit.open(job)
 }
 
 /// The plan of a unit: the folder's own where that is for the same work.
