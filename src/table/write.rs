@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use parquet::arrow::add_encoded_arrow_schema_to_metadata;
-use parquet::basic::{Compression, Encoding};
+use parquet::basic::{Compression, Encoding, Type};
 use parquet::file::metadata::{KeyValue, SortingColumn};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::SerializedFileWriter;
@@ -181,8 +181,10 @@ pub(super) fn properties(parsed: &ParsedSchema, options: WriteOptions) -> Writer
     for name in &options.sorted_by {
         builder = builder.set_column_statistics_enabled(ColumnPath::from(*name), EnabledStatistics::Page);
     }
-    let leaves = parsed.descriptor.columns().iter().map(|leaf| leaf.path());
-    for leaf in leaves {
+    for column in parsed.descriptor.columns() {
+        let leaf = column.path();
+        // A table that is carried from elsewhere may have texts where ours has numbers, and is found out by its check.
+        let is_whole = matches!(column.physical_type(), Type::INT32 | Type::INT64);
         let name = leaf.parts().first().map_or("", String::as_str);
         if parsed.is_float_list(name) || options.plain.contains(&name) || options.delta_encoded.contains(&name) {
             builder = builder.set_column_dictionary_enabled(leaf.clone(), false);
@@ -191,7 +193,7 @@ pub(super) fn properties(parsed: &ParsedSchema, options: WriteOptions) -> Writer
             builder = builder.set_column_dictionary_enabled(leaf.clone(), false);
             builder = builder.set_column_compression(leaf.clone(), Compression::UNCOMPRESSED);
         }
-        if options.delta_encoded.contains(&name) {
+        if options.delta_encoded.contains(&name) && is_whole {
             builder = builder.set_column_encoding(leaf.clone(), Encoding::DELTA_BINARY_PACKED);
         }
     }
