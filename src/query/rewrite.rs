@@ -184,11 +184,15 @@ fn is_name_of(expression: &Expr, names: &[Ident]) -> bool {
 
 /// Whether rows are put together.
 fn is_grouped(select: &Select) -> bool {
-    let has_keys = match &select.group_by {
+    has_keys(select) || select.projection.iter().filter_map(expression).any(has_aggregate)
+}
+
+/// Whether rows are put together by what they have in common.
+fn has_keys(select: &Select) -> bool {
+    match &select.group_by {
         GroupByExpr::All(_) => true,
         GroupByExpr::Expressions(expressions, _) => !expressions.is_empty(),
-    };
-    has_keys || select.projection.iter().filter_map(expression).any(has_aggregate)
+    }
 }
 
 /// Whether a SELECT has nothing but names and expressions of its own tables, so that it can be taken apart.
@@ -202,6 +206,19 @@ fn is_plain(select: &Select) -> bool {
 
 fn has_subquery(expression: &Expr) -> bool {
     any(expression, |part| matches!(part, Expr::Subquery(_) | Expr::InSubquery { .. } | Expr::Exists { .. }))
+}
+
+/// A column that a select without groups asks for beside aggregates, which are of all rows.
+pub(super) fn column_beside_aggregates(select: &Select) -> Option<String> {
+    if has_keys(select) || !select.projection.iter().filter_map(expression).any(has_aggregate) {
+        return None;
+    }
+    let is_column = |part: &Expr| matches!(part, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
+    select.projection.iter().find_map(|item| match expression(item) {
+        Some(expression) if !has_aggregate(expression) && any(expression, is_column) => Some(expression.to_string()),
+        Some(_) => None,
+        None => Some(item.to_string()),
+    })
 }
 
 fn has_aggregate(expression: &Expr) -> bool {

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use sqlparser::ast::{
-    Expr, ObjectName, Query, SetExpr, ShowStatementOptions, Statement, Visit, VisitMut, Visitor, VisitorMut,
+    Expr, ObjectName, Query, Select, SetExpr, ShowStatementOptions, Statement, TableFactor, Visit, VisitMut, Visitor,
+    VisitorMut,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserOptions};
 
 use super::QueryError;
-use super::rewrite::rewrite;
+use super::rewrite::{column_beside_aggregates, rewrite};
 
 /// What a statement asks for.
 pub(super) enum Asked {
@@ -108,6 +109,16 @@ impl Visitor for Check<'_> {
         ControlFlow::Continue(())
     }
 
+    fn pre_visit_table_factor(&mut self, table: &TableFactor) -> ControlFlow<Self::Break> {
+        let function = match table {
+            TableFactor::Table { name, args: Some(_), .. } | TableFactor::Function { name, .. } => last_name(name),
+            TableFactor::TableFunction { expr, .. } => expr.to_string(),
+            _ => return ControlFlow::Continue(()),
+        };
+        let instead = "only the tables of what is asked are read: SHOW TABLES names them";
+        ControlFlow::Break(Box::new(refused(&format!("{function}() in place of a table"), instead)))
+    }
+
     fn pre_visit_expr(&mut self, expression: &Expr) -> ControlFlow<Self::Break> {
         match expression {
             Expr::CompoundFieldAccess { .. } => self.0.has_elements = true,
@@ -130,7 +141,10 @@ impl Visitor for Check<'_> {
 /// Why a body cannot be answered.
 fn body(body: &SetExpr) -> Option<QueryError> {
     match body {
-        SetExpr::Select(select) => select.into.as_ref().map(|into| changes(&into.to_string())),
+        SetExpr::Select(select) => {
+            let changed = select.into.as_ref().map(|into| changes(&into.to_string()));
+            changed.or_else(|| ungrouped(select))
+        }
         SetExpr::SetOperation { left, right, .. } => self::body(left).or_else(|| self::body(right)),
         SetExpr::Query(_) | SetExpr::Values(_) | SetExpr::Table(_) => None,
         SetExpr::Insert(statement)
@@ -138,6 +152,13 @@ fn body(body: &SetExpr) -> Option<QueryError> {
         | SetExpr::Delete(statement)
         | SetExpr::Merge(statement) => Some(changes(&statement.to_string())),
     }
+}
+
+/// Why a select cannot be answered that has aggregates, no groups, and columns of single rows beside them.
+fn ungrouped(select: &Select) -> Option<QueryError> {
+    let column = column_beside_aggregates(select)?;
+    let instead = format!("write GROUP BY {column}, or FIRST({column})");
+    Some(refused(&format!("{column} beside an aggregate, which has no single row"), &instead))
 }
 
 /// Puts every query into the form that Polars answers, those within others first.
