@@ -13,13 +13,13 @@
 mod record;
 mod shown;
 
-pub use record::{Recorded, record};
+pub use record::{Record, Recorded};
 pub use shown::shown_task;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::artifact::{ContractError, IoError, StagingError};
+use crate::artifact::{ContractError, IoError, StageDir, StagingError};
 use crate::model::{self, ComputeDevice, Decoder, DeviceError, ModelConfig, ModelError};
 use crate::recording::RecordingError;
 use crate::remote::{Echo, InProcess, RemoteError, RemoteRobot, Session, SimulatedRobot};
@@ -83,7 +83,7 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// When it cannot be loaded, is for another family or number of slots, or looks at pictures.
+    /// When it cannot be loaded, is not as its manifest says, is for another family or number of slots, or looks at pictures.
     pub fn load(folder: &Path, device: ComputeDevice, demonstration: &Episode) -> Result<Self, DeployError> {
         let config = model::load_config(folder)?;
         let path = folder.to_owned();
@@ -98,6 +98,7 @@ impl Driver {
         if !config.reads_slots(expected) {
             return Err(DeployError::Slots { path, found, expected });
         }
+        StageDir::new("train", folder).check_whole()?;
         let (config, policy) = load_policy_on(&device.open()?, folder, Decoder::default())?;
         Ok(Self::Model { config: Box::new(config), policy })
     }
@@ -185,10 +186,8 @@ pub fn rehearse(
     tell: impl FnMut(&str) + Send + 'static,
 ) -> Result<Session, DeployError> {
     let now = RemoteRobot::observe(session)?.state();
-    let robot = SimulatedRobot::new(family, SimulationConfig::default(), Seed(0));
+    let robot = SimulatedRobot::new(family, SimulationConfig::default(), Seed(0)).standing(now);
     let wire = Echo::new(InProcess::new(robot), tell);
     let deadline = Duration::from_secs(1);
-    let rehearsal = Session::begin(Box::new(wire), "rehearsal", family, session.scene(), deadline)?;
-    RemoteRobot::reset(&rehearsal, &now)?;
-    Ok(rehearsal)
+    Ok(Session::begin(Box::new(wire), "rehearsal", family, session.scene(), deadline)?)
 }

@@ -12,7 +12,7 @@ use crate::artifact::StageDir;
 use crate::cli::ActArgs;
 use crate::commands::replay::{self, Found};
 use crate::commands::{CommandOutcome, UsageError, output};
-use crate::deploy::{DeployError, Driver, Recorded, Trials, record, rehearse, shown_task};
+use crate::deploy::{DeployError, Driver, Record, Recorded, Trials, rehearse, shown_task};
 use crate::remote::{Session, connect};
 use crate::rollout::RolloutEpisode;
 use crate::task;
@@ -34,6 +34,7 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
         Ok::<_, DeployError>(Trials { task, demonstration, counts: counts.clone(), seed: args.seed })
     };
     let trials = demonstrations.iter().map(trials).collect::<Result<Vec<_>, _>>()?;
+    let to_record = args.record.as_deref().map(Record::begin).transpose()?;
     let session = session(args, &trials[0], stop)?;
     let acted = match args.dry_run {
         true => {
@@ -45,9 +46,9 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
         }
         false => act(args, &trials, &mut driver, &session)?,
     };
-    if let Some(folder) = &args.record {
+    if let Some(to_record) = to_record {
         let model = StageDir::new("train", &args.model).version().ok();
-        record(folder, &Recorded { trials: &trials, driver: &driver, model, session: &session }, &acted)?;
+        to_record.finish(&Recorded { trials: &trials, driver: &driver, model, session: &session }, &acted)?;
     }
     conclude(args, &session, &acted, stop)
 }

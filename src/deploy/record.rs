@@ -84,14 +84,31 @@ impl Recorded<'_> {
     }
 }
 
-/// Writes the folder, which must be new or empty; it appears whole.
-///
-/// # Errors
-///
-/// When it cannot be written.
-pub fn record(folder: &Path, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
-    let staged = StagedDir::begin(folder)?;
-    let path = staged.partial_path();
+/// A folder to be written, which appears whole.
+pub struct Record(StagedDir);
+
+impl Record {
+    /// Begins a folder, which must be new or empty: before a robot moves, so that nothing is acted that cannot be kept.
+    ///
+    /// # Errors
+    ///
+    /// When there is something in it, or it cannot be made.
+    pub fn begin(folder: &Path) -> Result<Self, DeployError> {
+        Ok(Self(StagedDir::begin(folder)?))
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn finish(self, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
+        write(self.0.partial_path(), recorded, acted)?;
+        Ok(self.0.commit()?)
+    }
+}
+
+fn write(path: &Path, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
     let (dir, plan) = (StageDir::new(STAGE, path), recorded.plan());
     dir.write_plan(&plan)?;
     let mut writer = ShardWriter::create(&path.join(RECORDING), &serde_json::to_string(&plan).unwrap_or_default())?;
@@ -106,6 +123,5 @@ pub fn record(folder: &Path, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) 
         files: vec![FileEntry::of(path, RECORDING)?],
     })?;
     dir.commit(&plan, &[TABLE])?;
-    staged.commit()?;
     Ok(())
 }

@@ -36,6 +36,8 @@ pub struct SimulatedRobot {
     family: Family,
     config: SimulationConfig,
     seed: Seed,
+    /// How the table is set, if that is known.
+    standing: Option<SceneState>,
     /// What was asked for.
     scene: Option<Scene>,
     world: Option<Simulation>,
@@ -52,7 +54,12 @@ type Reply = Result<(Vec<Frame>, Answer), Refusal>;
 impl SimulatedRobot {
     /// For one family; where nobody says how the table is set, things start where the seed says.
     pub fn new(family: Family, config: SimulationConfig, seed: Seed) -> Self {
-        Self { family, config, seed, scene: None, world: None, stopped: false }
+        Self { family, config, seed, standing: None, scene: None, world: None, stopped: false }
+    }
+
+    /// The same, with a table that is set already.
+    pub fn standing(self, standing: SceneState) -> Self {
+        Self { standing: Some(standing), ..self }
     }
 
     /// The lines that answer a line, in order; none to a notification.
@@ -105,7 +112,8 @@ impl SimulatedRobot {
             RobotKind::Gripper => (asked, None),
             RobotKind::Sawyer => (own.clone(), Some(scene_message(&own))),
         };
-        let initial = task::initial_state_on(layout, family, &scene, self.seed);
+        let standing = self.standing.take().filter(|state| state.bodies_in_world.len() == scene.bodies.len());
+        let initial = standing.unwrap_or_else(|| task::initial_state_on(layout, family, &scene, self.seed));
         self.set_table(&scene, &initial)?;
         self.scene = Some(scene);
         let capabilities = [RESET, CARRY].map(str::to_owned).to_vec();

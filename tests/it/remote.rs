@@ -331,7 +331,7 @@ fn a_dry_run_asks_the_robot_nothing_but_where_things_are() {
     let acted = trials.act(&mut Driver::Oracle, &rehearsal, 0, false).unwrap();
     assert_eq!(acted.episode.outcome, Outcome::Success);
     assert_eq!(methods(&sent.lines()), ["hello", "observe"]);
-    let would_be = ["hello", "reset", "observe", "move_to", "grip", "move_to", "release", "settle"];
+    let would_be = ["hello", "observe", "move_to", "grip", "move_to", "release", "settle"];
     assert_eq!(methods(&told.lines()), would_be);
 }
 
