@@ -1,5 +1,6 @@
 //! Clips of episodes for people: MP4, GIF, or one picture.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::artifact::write;
@@ -101,7 +102,9 @@ pub fn write_mp4(path: &Path, episode: &Episode, camera: &CameraConfig, clip: &C
 ///
 /// As [`write_mp4`].
 pub fn write_gif(path: &Path, episode: &Episode, camera: &CameraConfig, clip: &ClipConfig) -> Result<Clip, VideoError> {
-    let gif = encode_gif(pictures(episode, camera, clip)?, clip.fps)?;
+    // The lanes' colours say which program it is.
+    let exact = if clip.programs { Lanes::new(episode, camera.size_px[0]).colors() } else { BTreeSet::new() };
+    let gif = encode_gif(pictures(episode, camera, clip)?, clip.fps, &exact)?;
     write(path, &gif)?;
     Ok(Clip { size_px: clip.size_px(episode, camera), n_pictures: clip.times(episode).count() as u64 })
 }

@@ -3,6 +3,8 @@
 //! Each lane begins with the running call in words. Beside it stand the calls up to now, as bars in the colours of the
 //! viewer, on an axis that is as long as the episode. A push of an adversary is a line across all lanes.
 
+use std::collections::BTreeSet;
+
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 use crate::trace::{Episode, ProgramCall, calls_by_depth};
@@ -57,6 +59,19 @@ impl<'e> Lanes<'e> {
         2 * MARGIN + LANE * self.lanes.len() as u32
     }
 
+    /// All colours but those at the edges of words.
+    pub(super) fn colors(&self) -> BTreeSet<[u8; 3]> {
+        let bars = self.lanes.iter().flat_map(|bars| bars.iter().enumerate());
+        let of_bars = bars.map(|(position, bar)| self.color(position, bar));
+        of_bars.chain([BACKGROUND, EMPTY, PUSH, TEXT]).collect()
+    }
+
+    /// Of the nth bar of a lane.
+    fn color(&self, position: usize, bar: &Bar<'_>) -> [u8; 3] {
+        let share = if position.is_multiple_of(2) { 100 } else { ODD_SHADE };
+        bar.call.color(&self.episode.scene).map(|part| (u32::from(part) * share / 100) as u8)
+    }
+
     fn bars(&self, calls: &[&'e ProgramCall]) -> Vec<Bar<'e>> {
         let bar = |&call: &&'e ProgramCall| {
             let [begin, end] = [call.frames.begin, call.frames.last()].map(|frame| self.column(self.time(frame)));
@@ -100,9 +115,7 @@ impl<'e> Lanes<'e> {
         let rows = [middle - BAR / 2, middle + BAR / 2];
         fill(picture, [self.left, self.width.saturating_sub(MARGIN)], rows, EMPTY);
         for (position, bar) in bars.iter().enumerate().filter(|(_, bar)| bar.begin <= now) {
-            let share = if position % 2 == 0 { 100 } else { ODD_SHADE };
-            let color = bar.call.color(&self.episode.scene).map(|part| (u32::from(part) * share / 100) as u8);
-            fill(picture, [bar.begin, bar.end.min(now + 1)], rows, color);
+            fill(picture, [bar.begin, bar.end.min(now + 1)], rows, self.color(position, bar));
         }
         if let Some(bar) = bars.iter().rev().find(|bar| bar.begin <= now && now <= bar.end) {
             let words = bar.call.label(&self.episode.scene);
