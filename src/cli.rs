@@ -38,7 +38,14 @@ Words:
   run        the folder of what a pipeline made
   stage      a step of a pipeline: tasks, generate, convert, train, rollout, report
   shard      a part of a stage's work, done and repeated by itself
+  item       a shard of something that a stage makes, with a number: what one process can be asked for
+  family     what tasks have in common: Block Stacking, Object Sorting, Table Clean-up, Kitting
   task       a goal and the things that it is about; training may use seen tasks, not unseen ones
+  program    a step of how a task is done: the task itself, a sub-task, pick or place, or a primitive,
+             which moves the robot (move_to, grip, release)
+  slot       a place in the observation: one thing, or one of several things that are alike
+  scope      the part of a demonstration that a called program may see; frames have scoping labels
+  boundary   a frame at which a primitive has just ended
   episode    one attempt at a task, by the expert (a demonstration) or by a model (a rollout)
   recording  episodes as they happened, in an MCAP file
   dataset    episodes as Parquet tables: a LeRobotDataset v3.0 with program tables beside it
@@ -50,7 +57,7 @@ Words:
 
 Results go to stdout, progress to stderr.
 Exit codes: 0 done; 1 failed, or a check failed; 2 wrong usage or pipeline file; \
-3 done, but something was left out; 130 interrupted (the same command carries on).";
+3 done, but something was left out, or left to do; 130 interrupted (the same command carries on).";
 
 /// What to do.
 #[derive(Debug, Subcommand)]

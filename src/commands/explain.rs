@@ -99,7 +99,7 @@ fn recording_text(recording: &RecordingLineage) -> Vec<String> {
 fn stage_text(stage: &StageLineage, depth: usize) -> Vec<String> {
     let indent = "  ".repeat(depth);
     let path = stage.path.as_ref().map(|path| format!(" → {}", path.display())).unwrap_or_default();
-    let commit = stage.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
+    let commit = stage.commit.as_ref().map(|commit| format!(", pipeline file at commit {commit}")).unwrap_or_default();
     let mut lines = vec![format!("{indent}{} by ntp {}{commit}{path}", stage.stage, stage.ntp_version)];
     lines.push(format!("{indent}  plan {}", stage.plan_id));
     lines.extend(stage.version.iter().map(|version| format!("{indent}  manifest {version}")));

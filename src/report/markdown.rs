@@ -179,7 +179,7 @@ fn note(note: &Note) -> String {
 pub(super) fn made_by(report: &Report) -> String {
     let mut parts = vec![format!("ntp {}", report.ntp_version)];
     if !report.commits.is_empty() {
-        parts.push(format!("commit {}", report.commits.join(", ")));
+        parts.push(format!("pipeline files at commit {}", report.commits.join(", ")));
     }
     let mut seeds: Vec<i64> = report.models.iter().map(|model| model.seed).collect();
     seeds.sort_unstable();

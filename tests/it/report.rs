@@ -481,7 +481,7 @@ fn the_markdown_says_what_made_the_figures() {
     let run = Run::new(&ten_rollouts());
     run.make();
     insta::assert_snapshot!(run.text("report.md"), @"
-    **Ten <rollouts>**: ntp 0.1.0, commit 0123456789, training seeds 0, 1.5 CPU-minutes.
+    **Ten <rollouts>**: ntp 0.1.0, pipeline files at commit 0123456789, training seeds 0, 1.5 CPU-minutes.
 
     | suite           | model | tasks | decoder | seeds | rollouts | success | goals met | 95 % over rollouts | lowest, highest seed | 95 % over seeds | paper |
     | --------------- | ----- | ----: | ------- | ----: | -------: | ------: | --------: | ------------------ | -------------------- | --------------- | ----: |
