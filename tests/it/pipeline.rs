@@ -238,7 +238,9 @@ fn a_model_of_another_family_or_variant_is_refused_with_its_path_and_what_is_ask
     let folder = smoke::copy_to("train");
     let config = folder.path().join("models/ntp-seed0/config.json");
     let text = std::fs::read_to_string(&config).unwrap();
-    // As many bytes as before: the manifest looks at no more when it says what is up to date.
+    let manifest = folder.path().join("models/ntp-seed0/manifest.json");
+    let told = std::fs::read_to_string(&manifest).unwrap();
+    let hash_before = sha256_file(&config).unwrap();
     for (own, other, expected) in [
         ("\"block_stacking\"", "\"object_sorting\"", "model is for family object_sorting, but block_stacking is"),
         ("\"variant\": \"ntp\"", "\"variant\":\"flat\"", "model is for variant flat, but ntp is asked for"),
@@ -246,6 +248,8 @@ fn a_model_of_another_family_or_variant_is_refused_with_its_path_and_what_is_ask
         let changed = text.replacen(own, other, 1);
         assert!(changed.len() == text.len() && changed != text, "{own} in {text}");
         std::fs::write(&config, changed).unwrap();
+        // As if it had been made so: what is not as its manifest says is not even looked at.
+        std::fs::write(&manifest, told.replace(&hash_before, &sha256_file(&config).unwrap())).unwrap();
         let (code, _, stderr) = run_smoke(folder.path(), &[]);
         assert_eq!(code, 1);
         assert!(stderr.contains("models/ntp-seed0/config.json") && stderr.contains(expected), "{stderr}");
@@ -266,6 +270,35 @@ fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
     let line = |start: &str| stdout.lines().find(|line| line.starts_with(start)).unwrap_or_default().to_owned();
     assert!(line("convert").contains("up to date"), "{stdout}");
     assert!(line("train").contains("its setting training changed"), "{stdout}");
+    // What is made of it is to do as well, though its own plan still fits what lies there.
+    assert!(line("rollout ntp").contains("train comes first"), "{stdout}");
+    assert!(line("rollout oracle").contains("up to date"), "{stdout}");
+    assert!(line("report").contains("rollout comes first"), "{stdout}");
+}
+
+#[test]
+fn nothing_is_made_of_a_file_with_a_flipped_bit() {
+    let folder = smoke::copy_to("report");
+    let out = folder.path().to_string_lossy();
+    let before = hashes(folder.path(), &ALL);
+    for (stage, file) in [
+        ("generate", "tasks/tasks.json"),
+        ("convert", "recordings/shard-00001-of-00003.mcap"),
+        ("train", "dataset/data/chunk-000/file-000.parquet"),
+        ("rollout", "models/ntp-seed0/model.safetensors"),
+        ("report", "rollouts/ntp-seed0-mss/stacking_unseen/rollouts.parquet"),
+    ] {
+        let path = folder.path().join(file);
+        let bytes = std::fs::read(&path).unwrap();
+        let mut damaged = bytes.clone();
+        damaged[bytes.len() / 2] ^= 0x10;
+        std::fs::write(&path, damaged).unwrap();
+        let (code, _, stderr) = run(&[stage, smoke::PIPELINE, "--out", out.as_ref(), "--force"]);
+        assert_eq!(code, 1, "{stage}: {stderr}");
+        assert!(stderr.contains(file) && stderr.contains("its manifest says"), "{stage}: {stderr}");
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(hashes(folder.path(), &ALL), before, "{stage}");
+    }
 }
 
 #[test]

@@ -247,6 +247,20 @@ fn what_is_not_answered_is_refused_with_what_to_write_instead() {
     ] {
         assert!(refused(sql).contains("tables are only read"), "{sql}: {}", refused(sql));
     }
+    for sql in ["SELECT * FROM read_csv('/etc/passwd')", "SELECT 1 AS x FROM calls JOIN read_parquet('x') p ON true"] {
+        assert!(refused(sql).contains("in place of a table is not answered; write"), "{sql}: {}", refused(sql));
+    }
+    for sql in [
+        "SELECT program, COUNT(*) FROM calls",
+        "SELECT MAX(depth), depth + 1 FROM calls",
+        "SELECT *, COUNT(*) FROM calls",
+    ] {
+        assert!(refused(sql).contains("beside an aggregate"), "{sql}: {}", refused(sql));
+    }
+    assert_eq!(
+        rows(&tables, "SELECT 1 + COUNT(*) AS n, 'x' AS x FROM episodes"),
+        [json!({ "n": episodes().len() + 1, "x": "x" })]
+    );
     assert!(refused("SELECT 1; SELECT 2").starts_with("more than one statement"));
     assert!(refused("").starts_with("an empty statement"));
 }

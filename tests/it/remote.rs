@@ -423,6 +423,22 @@ fn a_robot_that_listens_is_acted_on_over_tcp() {
 
 #[cfg(unix)]
 #[test]
+fn a_robot_does_not_move_for_what_cannot_be_recorded() {
+    let folder = recording();
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    std::fs::write(folder.path().join("full/x"), "").unwrap();
+    let acted = Command::new(binary())
+        .args(["act", "oracle", "--demonstration", "shown.mcap", "--robot", "tee asked.jsonl", "--record", "full"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert_eq!(acted.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&acted.stderr).contains("only a new or empty folder is written"));
+    assert!(!folder.path().join("asked.jsonl").exists(), "the robot was asked something");
+}
+
+#[cfg(unix)]
+#[test]
 fn ctrl_c_stops_the_robot_and_keeps_what_was_seen() {
     let folder = recording();
     let task = tower("t", &[4, 1], Split::Unseen);

@@ -117,6 +117,7 @@ fn a_wrong_study_names_file_key_and_what_is_allowed_and_writes_nothing() {
     check_refused("name = \"x\"\nexperiments = []", &[], &["wrong.toml", "experiments", "at least one"]);
     check_refused("name = \"x\"\nexperiments = [\"no.toml\"]", &[], &["experiments[0]", "no such file", "no.toml"]);
     check_refused("name = \"x\"\nexperiments = [\"pair.toml\"]", &[], &["experiments[0]", "is a study"]);
+    check_refused("name = \"x\"\nexperiments = [\"wrong.toml\"]", &[], &["experiments[0]", "is a study"]);
     check_refused("name = \"x\"\nexperiments = [\"one.toml\", \"one.toml\"]", &[], &["experiments[1]", "must differ"]);
     check_refused("name = \"x\"\nexperiments = [\"report.toml\"]", &[], &["experiments[0]", "own report"]);
     check_refused("name = \"x\"\ntasks = 1\nexperiments = [\"one.toml\"]", &[], &["tasks", "expected one of"]);
