@@ -145,6 +145,8 @@ fn write(
     settings: Value,
     mut is_wanted: impl FnMut(&EpisodeWords<'_>, &dyn Fn(&str) -> bool) -> bool,
 ) -> Result<EditSummary, EditError> {
+    // Nothing is made of a file that is not, by its hash, as it was made.
+    roots.iter().try_for_each(|root| StageDir::new("convert", root).check_whole())?;
     let is_own = |root: &PathBuf| program_tables(root) == ProgramTables::Own;
     let n_own = roots.iter().filter(|root| is_own(root)).count();
     let (summary, descriptions) = if n_own == roots.len() && n_own > 0 {

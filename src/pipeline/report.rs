@@ -76,7 +76,7 @@ impl Unit for Report<'_> {
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
         let units = |(pipeline, run): (&'_ Pipeline, RunDir)| {
-            rollout::units(pipeline).into_iter().map(|unit| unit.dir(&run)).collect::<Vec<_>>()
+            self.acted(pipeline).into_iter().map(|unit| unit.dir(&run)).collect::<Vec<_>>()
         };
         self.runs(run).into_iter().flat_map(units).collect()
     }

@@ -90,7 +90,7 @@ pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<S
         let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
         reports.extend(run_experiment(pipeline, &dir.experiment(&pipeline.spec.name), &options, &mut to_do)?);
     }
-    reports.extend(run_models(study, dir, options)?);
+    reports.extend(run_models(study, dir, options, &mut to_do)?);
     if options.to == Stage::Report {
         let own = upstream::boxed(vec![report::of_study(study)]);
         reports.extend(run_units(&Context { dir, options }, &study.path, own, &mut to_do)?);
@@ -99,13 +99,18 @@ pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<S
 }
 
 /// Trains the study's own models, and lets them act the suites of its experiments.
-fn run_models(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+fn run_models(
+    study: &Study,
+    dir: &RunDir,
+    options: &Options,
+    to_do: &mut ToDo,
+) -> Result<Vec<StageReport>, PipelineError> {
     let is_asked_for = |stage| (options.from..=options.to).contains(&stage);
     let mut reports = Vec::new();
     if is_asked_for(Stage::Train) {
         let models = upstream::boxed(train::units_of_study(study));
-        reports
-            .extend(pool(&study.path, options)?.install(|| run_units(&Context { dir, options }, &study.path, models))?);
+        let context = Context { dir, options };
+        reports.extend(pool(&study.path, options)?.install(|| run_units(&context, &study.path, models, to_do))?);
     }
     for pipeline in study.experiments.iter().filter(|_| is_asked_for(Stage::Rollout)) {
         let suites = upstream::boxed(rollout::units_of_study(study, pipeline));
@@ -113,7 +118,7 @@ fn run_models(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<Stag
         let options = Options { experiment: Some(pipeline.spec.name.clone()), ..options.clone() };
         let _lock = if suites.is_empty() { None } else { lock(&own, &options)? };
         let context = Context { dir: &own, options: &options };
-        reports.extend(pool(&study.path, &options)?.install(|| run_units(&context, &study.path, suites))?);
+        reports.extend(pool(&study.path, &options)?.install(|| run_units(&context, &study.path, suites, to_do))?);
     }
     Ok(reports)
 }

@@ -116,7 +116,7 @@ impl Unit for Model<'_> {
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
-        vec![run.dataset()]
+        self.experiments().into_iter().map(|pipeline| self.run_of(pipeline, run).dataset()).collect()
     }
 
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
