@@ -38,11 +38,11 @@ Words:
   run        the folder of what a pipeline made
   stage      a step of a pipeline: tasks, generate, convert, train, rollout, report
   shard      a part of a stage's work, done and repeated by itself
-  item       a shard of something that a stage makes, with a number: what one process can be asked for
+  item       a shard of something that a stage makes, with a number: work for one process
   family     what tasks have in common: Block Stacking, Object Sorting, Table Clean-up, Kitting
   task       a goal and the things that it is about; training may use seen tasks, not unseen ones
-  program    a step of how a task is done: the task itself, a sub-task, pick or place, or a primitive,
-             which moves the robot (move_to, grip, release)
+  program    a step of how a task is done: the task itself, a sub-task, pick or place, or a
+             primitive, which moves the robot (move_to, grip, release)
   slot       a place in the observation: one thing, or one of several things that are alike
   scope      the part of a demonstration that a called program may see; frames have scoping labels
   boundary   a frame at which a primitive has just ended

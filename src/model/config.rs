@@ -316,7 +316,9 @@ impl ModelConfig {
             NetworkConfig::ObjectCentric(_) => {
                 self.variant.scoping() != ScopingKind::Arguments || n_slots == self.n_slots
             }
-            NetworkConfig::Flattened(_) => self.families().any(|own| own.n_slots() == n_slots),
+            NetworkConfig::Flattened(_) if self.families().count() > 1 => {
+                n_slots <= self.n_slots && self.families().any(|own| own.n_slots() == n_slots)
+            }
             _ => n_slots == self.n_slots,
         }
     }

@@ -115,7 +115,7 @@ impl Visitor for Check<'_> {
             TableFactor::TableFunction { expr, .. } => expr.to_string(),
             _ => return ControlFlow::Continue(()),
         };
-        let instead = "only the tables of what is asked are read: SHOW TABLES names them";
+        let instead = "write the name of a table, which SHOW TABLES tells: other files are not read";
         ControlFlow::Break(Box::new(refused(&format!("{function}() in place of a table"), instead)))
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use ntp::artifact::sha256_file;
 use ntp::recording::ShardReader;
 use ntp::video::decode_png;
 
@@ -227,8 +228,13 @@ fn a_damaged_picture_stops_training_with_task_episode_and_camera() {
     let png = b"\x89PNG";
     let starts: Vec<usize> = (0..bytes.len() - 4).filter(|&at| &bytes[at..at + 4] == png).collect();
     assert!(starts.len() > 100);
+    let hash_before = sha256_file(&data).unwrap();
     starts.iter().for_each(|&at| bytes[at..at + 4].fill(0));
     std::fs::write(&data, bytes).unwrap();
+    // As if it had been made so: what is not as its manifest says is not even read.
+    let manifest = folder.path().join("run/dataset/manifest.json");
+    let told = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(&manifest, told.replace(&hash_before, &sha256_file(&data).unwrap())).unwrap();
     std::fs::remove_dir_all(folder.path().join("run/models")).unwrap();
     let (code, stderr) = command(&["train", &pipeline, "--out", &out]);
     assert_eq!(code, 1);

@@ -739,6 +739,7 @@ fn write_own_table(path: &Path) {
         ("on_table_min", maybe_whole(|_| None)),
         ("on_table_max", maybe_whole(|_| None)),
         ("bowls", maybe_whole(|_| None)),
+        ("robot", maybe(|_| Some("gripper"))),
         ("core", maybe(|row| parts(row.variant).map(|parts| parts[0]))),
         ("scoping", maybe(|row| parts(row.variant).map(|parts| parts[1]))),
         ("encoder", maybe(|row| parts(row.variant).map(|parts| parts[2]))),
