@@ -84,6 +84,15 @@ impl FieldPath {
         }
         Some(found.unwrap_or_else(|| message.clone()))
     }
+
+    /// Whether a message is about other things alone: it has a list of named elements, and none of the name asked for. A
+    /// tree of transforms comes in such messages, each with the frames that have moved.
+    pub(super) fn is_of_others(&self, message: &Value) -> bool {
+        let Some(at) = self.steps.iter().position(|step| matches!(step, Step::Where(..))) else { return false };
+        let before = Self { text: self.text.clone(), steps: self.steps[..at].to_vec() };
+        let up_to = Self { text: self.text.clone(), steps: self.steps[..=at].to_vec() };
+        matches!(before.select(message), Some(Value::List(_))) && up_to.select(message).is_none()
+    }
 }
 
 #[cfg(test)]
@@ -104,6 +113,10 @@ mod tests {
         let list = Value::List(vec![pose("a", 4.0), pose("b", 5.0)]);
         let message = Value::Fields(vec![("data".into(), numbers.clone()), ("poses".into(), list)]);
         assert_eq!(path("data").select(&message), Some(numbers));
+        assert!(path("poses[frame=c].x").is_of_others(&message));
+        for about in ["poses[frame=b].x", "poses[frame=b].y", "data[2]", "nothing[frame=c]"] {
+            assert!(!path(about).is_of_others(&message), "{about}");
+        }
         assert_eq!(path("data[2]").select(&message), Some(Value::Number(3.0)));
         assert_eq!(path("data[1:3]").select(&message), Some(Value::List(vec![Value::Number(2.0), Value::Number(3.0)])));
         assert_eq!(path("poses[frame=b].x").select(&message), Some(Value::Number(5.0)));

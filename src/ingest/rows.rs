@@ -175,6 +175,9 @@ impl<'r, 'm> Reading<'r, 'm> {
     }
 
     fn sample(&mut self, number: usize, at: i64, message: Option<&Value>) {
+        if message.is_some_and(|message| self.samplers[number].is_of_others(message)) {
+            return;
+        }
         let (feature, track) = &mut self.tracks[number];
         track.counts.messages += 1;
         let taken = message.and_then(|message| self.samplers[number].take(message).ok());

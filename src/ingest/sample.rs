@@ -37,6 +37,11 @@ impl<'m> Sampler<'m> {
         Self { source, pictures: PictureTaker::new(feature.store) }
     }
 
+    /// Whether a message is about other things alone.
+    pub(super) fn is_of_others(&self, message: &Value) -> bool {
+        self.source.field.is_of_others(message)
+    }
+
     /// What a message gives, with its kind.
     pub(super) fn take(&mut self, message: &Value) -> Result<(Content, ContentKind), Reason> {
         let path = &self.source.field;
