@@ -5,7 +5,7 @@
 //!
 //! # Source
 //!
-//! Kuffner and LaValle, "RRT-Connect", ICRA 2000: two trees, from the start and from the goal; one grows towards a drawn
+//! Kuffner and `LaValle`, "RRT-Connect", ICRA 2000: two trees, from the start and from the goal; one grows towards a drawn
 //! place, the other as far as it can towards the first one's new end.
 //!
 //! # Invariants

@@ -166,7 +166,7 @@ struct Trainer<'j> {
 enum Trials {
     Here(DatasetTrials),
     /// Too many for memory.
-    Streamed(TrialStream),
+    Streamed(Box<TrialStream>),
 }
 
 impl Trials {
@@ -240,7 +240,7 @@ fn training_trials(unit: &Model<'_>, job: &Job<'_>) -> Result<Trials, PipelineEr
         Ok::<_, PipelineError>(
             match dataset::read_learned_trials(run.dataset().path(), is_taken, most_frames, folder)? {
                 LearnedTrials::Here(data) => Trials::Here(data),
-                LearnedTrials::OnDisk(spool) => Trials::Streamed(TrialStream::new(spool, most_frames)?),
+                LearnedTrials::OnDisk(spool) => Trials::Streamed(Box::new(TrialStream::new(spool, most_frames)?)),
             },
         )
     };

@@ -106,7 +106,7 @@ pub struct GridCell {
 
 /// Those figures of each experiment that its rollouts have enough points of.
 pub(super) fn figures(aggregates: &[Aggregate]) -> Vec<Figure> {
-    let (papers, all) = (experiments(aggregates), experiments_of(aggregates, |actor| actor.is_demonstrated()));
+    let (papers, all) = (experiments(aggregates), experiments_of(aggregates, super::actor::Actor::is_demonstrated));
     let of_definition = |definition: &'static Definition| {
         let experiments = if definition.shows_tagged { &all } else { &papers };
         let figures = experiments.iter().map(|rows| figure(definition, rows));

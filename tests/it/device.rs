@@ -58,7 +58,6 @@ const VARIANTS: [&str; 17] = [
 ];
 
 /// The program with wgpu in it, if there is one.
-#[expect(clippy::disallowed_methods, reason = "which program is tested is no setting of the program")]
 fn with_wgpu() -> Option<PathBuf> {
     let own = Feature::Wgpu.is_built_in().then(|| PathBuf::from(env!("CARGO_BIN_EXE_ntp")));
     own.or_else(|| std::env::var_os("NTP_WGPU").map(PathBuf::from))

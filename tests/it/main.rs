@@ -38,6 +38,7 @@ mod expert;
 mod export;
 #[cfg(test)]
 mod foreign;
+#[cfg(test)]
 mod forward;
 #[cfg(test)]
 mod fuzz;

@@ -76,6 +76,7 @@ pub(crate) enum Dtype {
 /// What `LeRobot` wants to know of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[derive(Default)]
 pub(crate) struct CameraInfo {
     #[serde(rename = "video.height")]
     height: u32,
@@ -92,12 +93,6 @@ pub(crate) struct CameraInfo {
     #[serde(rename = "video.channels")]
     channels: u32,
     has_audio: bool,
-}
-
-impl Default for CameraInfo {
-    fn default() -> Self {
-        Self { codec: String::new(), ..Self::h264([0, 0], 0.0) }
-    }
 }
 
 /// A rate as LeRobot writes it: whole where it is.

@@ -1,6 +1,6 @@
 //! Columns of others as arrays of the types that are reckoned with: whatever a reader would cast is cast.
 
-use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float32Type, Float64Type, Int64Type};
 

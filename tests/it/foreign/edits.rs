@@ -112,7 +112,7 @@ fn the_format_before_is_read_alike_and_becomes_the_new_one() {
     mini.subtasks = None;
     mini.write(&new);
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
-    merge(&[old.clone()], &a, Carry::Packets).unwrap();
+    merge(std::slice::from_ref(&old), &a, Carry::Packets).unwrap();
     merge(&[new], &b, Carry::Packets).unwrap();
     is_whole(&a);
     assert_eq!(info(&a)["codebase_version"], "v3.0");
@@ -153,7 +153,7 @@ fn packets_are_carried_over_by_time_and_not_encoded_again() {
     );
     assert_eq!(ask(&to, &place), "a,b\n0.0,0.6\n0.6,1.0\n");
     let same = folder.path().join("same");
-    merge(&[root.clone()], &same, Carry::Packets).unwrap();
+    merge(std::slice::from_ref(&root), &same, Carry::Packets).unwrap();
     assert!(diff(&root, &same).unwrap().is_none());
     let found = diff(&root, &to).unwrap();
     assert_eq!((found.same, found.moved, found.removed, found.added), (2, 1, 1, 0));
@@ -191,10 +191,11 @@ fn an_episode_within_a_group_of_pictures_is_refused_or_encoded_again() {
 fn what_does_not_fit_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let a = made(folder.path(), "a", |_| {});
-    let cases: [(&str, &str, fn(&mut Mini)); 4] = [
+    type Case = (&'static str, &'static str, fn(&mut Mini));
+    let cases: [Case; 4] = [
         ("edit.fps", "fps is 20, but in", |mini| mini.info["fps"] = json!(20)),
         ("edit.features", "feature \"action\" is float32 [3], but in", |mini| {
-            mini.info["features"]["action"]["shape"] = json!([3])
+            mini.info["features"]["action"]["shape"] = json!([3]);
         }),
         ("edit.features", "feature \"subtask_index\" is not there", |mini| {
             mini.info["features"].as_object_mut().unwrap().remove("subtask_index");

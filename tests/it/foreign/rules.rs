@@ -32,6 +32,7 @@ fn found(root: &Path) -> Vec<String> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "one case a line, and nothing else")]
 fn what_lerobot_takes_is_taken() {
     let cases: Vec<(&str, Change)> = vec![
         ("as it is", Box::new(|_| {})),
@@ -147,6 +148,7 @@ fn files_may_be_numbered_with_gaps_and_litter_is_passed_over() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "one case a line, and nothing else")]
 fn what_lerobot_would_refuse_or_misread_is_a_finding() {
     let swap = |name: &'static str, column: ArrayRef| -> Change {
         Box::new(move |mini| {
@@ -306,7 +308,8 @@ fn videos_are_held_against_the_times_of_frames() {
         let name = format!("videos/{}/from_timestamp", crate::foreign::mini::CAMERA);
         mini.episodes.iter_mut().find(|(known, _)| *known == name).unwrap().1 = doubles(secs);
     };
-    let cases: [(&str, &str, &dyn Fn(&mut Mini), bool); 6] = [
+    type Case<'c> = (&'c str, &'c str, &'c dyn Fn(&mut Mini), bool);
+    let cases: [Case<'_>; 6] = [
         ("pictures.place", "it is missing, but 3 episodes", &|_| {}, false),
         ("pictures.time", "frame 0 has no picture at 0.650000 s", &|mini| from(mini, [0.0, 0.65, 1.1]), true),
         (

@@ -39,7 +39,7 @@ pub(in crate::dataset::edit) fn differing(
     [first, second]: [usize; 2],
 ) -> Result<BTreeMap<String, u64>, EditError> {
     let (a, b) = (before.columns(first)?, after.columns(second)?);
-    let n_rows = |columns: &BTreeMap<String, ArrayRef>| columns.values().next().map_or(0, |column| column.len());
+    let n_rows = |columns: &BTreeMap<String, ArrayRef>| columns.values().next().map_or(0, arrow::array::Array::len);
     let (in_first, in_second) = (n_rows(&a), n_rows(&b));
     let mut differing = BTreeMap::new();
     if in_first != in_second {
@@ -61,6 +61,9 @@ pub(in crate::dataset::edit) fn differing(
     }
     Ok(differing)
 }
+
+/// A video and its packets of an episode, one a frame.
+type VideoPackets = (String, Vec<Vec<u8>>);
 
 /// A dataset whose episodes are compared.
 pub(in crate::dataset::edit) struct Contents {
@@ -146,7 +149,7 @@ impl Contents {
     }
 
     /// The packets of an episode's videos, one a frame.
-    fn packets(&mut self, episode: &PlainEpisode) -> Result<Vec<(String, Vec<Vec<u8>>)>, EditError> {
+    fn packets(&mut self, episode: &PlainEpisode) -> Result<Vec<VideoPackets>, EditError> {
         let mut all = Vec::new();
         let info = &self.source.info;
         for ((video, span), open) in info.videos().zip(&episode.videos).zip(&mut self.tracks) {

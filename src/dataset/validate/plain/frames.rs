@@ -294,7 +294,8 @@ impl Bookkeeping {
         let is_off = |&row: &usize| {
             let expected = expected(row);
             // What is no number is off too.
-            !((self.secs[row] - expected).abs() <= TOLERANCE_SECS + expected * f64::from(f32::EPSILON))
+            let off_by = (self.secs[row] - expected).abs();
+            off_by.is_nan() || off_by > TOLERANCE_SECS + expected * f64::from(f32::EPSILON)
         };
         let mut off = run.rows.clone().filter(is_off);
         let first = off.next()?;

@@ -103,7 +103,7 @@ fn value_problem(of: &Value, feature: &Declared, n_rows: u64) -> Option<String> 
         }
     }
     let std = flat(of, "std")?;
-    let at = (0..width).find(|&at| !(std[at] >= 0.0))?;
+    let at = (0..width).find(|&at| std[at].is_nan() || std[at] < 0.0)?;
     Some(format!("dimension {at}: std is {}", std[at]))
 }
 
