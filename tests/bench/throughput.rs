@@ -10,7 +10,6 @@ use std::process::Command;
 
 use burn::tensor::Device;
 use cpu_time::ProcessTime;
-use mimalloc::MiMalloc;
 use ntp::arm::{Upright, Vector, solutions};
 use ntp::dataset::{
     ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, TrialData, TrialSpool, convert, read_trials,
@@ -28,10 +27,6 @@ use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state_on, sample, scene_on};
 use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
 use ntp::training::{Hooks, Source, TrainConfig, Training, TrialStream, train, train_from};
-
-/// The program's.
-#[global_allocator]
-static ALLOCATOR: MiMalloc = MiMalloc;
 
 /// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
 fn load(dataset: &Path) -> usize {
