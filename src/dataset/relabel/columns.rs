@@ -1,5 +1,11 @@
 //! The columns that hold an episode's labels, frame by frame.
 
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, RecordBatch};
+use arrow::datatypes::{Field, Schema};
+use arrow::error::ArrowError;
+
 use crate::dataset::export::language::{Entry, numbered};
 use crate::dataset::labelled::TreeLabels;
 use crate::dataset::relabel::EpisodeTree;
@@ -75,4 +81,18 @@ fn entries(labelled: TreeLabels<'_>, fps: u32) -> Vec<Entry> {
     let mut entries: Vec<Entry> = plans.chain(skills).chain(motions).collect();
     entries.sort_by(|a, b| a.timestamp.total_cmp(&b.timestamp));
     entries
+}
+
+/// The rows with columns in place of those of the same name, or behind all.
+pub(super) fn with_columns(rows: &RecordBatch, columns: Vec<(Field, ArrayRef)>) -> Result<RecordBatch, ArrowError> {
+    let schema = rows.schema();
+    let mut all: Vec<(Arc<Field>, ArrayRef)> = schema.fields().iter().cloned().zip(rows.columns().to_vec()).collect();
+    for (field, array) in columns {
+        match all.iter_mut().find(|(known, _)| known.name() == field.name()) {
+            Some(known) => *known = (Arc::new(field), array),
+            None => all.push((Arc::new(field), array)),
+        }
+    }
+    let (fields, arrays): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+    RecordBatch::try_new(Arc::new(Schema::new(fields).with_metadata(schema.metadata().clone())), arrays)
 }

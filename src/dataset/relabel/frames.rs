@@ -6,7 +6,7 @@ use std::sync::Arc;
 use arrow::array::{
     Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray,
 };
-use arrow::datatypes::{DataType, Field, Float32Type, Int64Type, Schema};
+use arrow::datatypes::{DataType, Field, Float32Type, Int64Type};
 use arrow::error::ArrowError;
 use serde_json::Value;
 
@@ -15,7 +15,7 @@ use crate::dataset::export::language;
 use crate::dataset::files::info::Dtype;
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::relabel::EpisodeTree;
-use crate::dataset::relabel::columns::{LabelColumns, LabelTexts};
+use crate::dataset::relabel::columns::{LabelColumns, LabelTexts, with_columns};
 use crate::dataset::relabel::tables::{EpisodeSource, Tables, Written};
 use crate::dataset::schema::FRAMES;
 use crate::dataset::statistics::{NumericFeature, Statistics};
@@ -200,7 +200,7 @@ impl BatchLabels {
         ];
         columns.extend(times(rows)?);
         columns.extend(language::columns(&self.entries, self.positions, &self.lengths)?);
-        with_labels(rows, columns)
+        with_columns(rows, columns)
     }
 }
 
@@ -224,18 +224,4 @@ fn times(rows: &RecordBatch) -> Result<Vec<(Field, ArrayRef)>, ArrowError> {
 
 fn micros(secs: f32) -> f64 {
     (f64::from(secs) * 1e6).round() / 1e6
-}
-
-/// The rows with columns in place of those of the same name, or behind all.
-fn with_labels(rows: &RecordBatch, columns: Vec<(Field, ArrayRef)>) -> Result<RecordBatch, ArrowError> {
-    let schema = rows.schema();
-    let mut all: Vec<(Arc<Field>, ArrayRef)> = schema.fields().iter().cloned().zip(rows.columns().to_vec()).collect();
-    for (field, array) in columns {
-        match all.iter_mut().find(|(known, _)| known.name() == field.name()) {
-            Some(known) => *known = (Arc::new(field), array),
-            None => all.push((Arc::new(field), array)),
-        }
-    }
-    let (fields, arrays): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-    RecordBatch::try_new(Arc::new(Schema::new(fields).with_metadata(schema.metadata().clone())), arrays)
 }

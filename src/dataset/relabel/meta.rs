@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, AsArray as _, BooleanArray, RecordBatch, StringArray};
-use arrow::datatypes::{DataType, Field, Int64Type, Schema};
+use arrow::datatypes::{DataType, Field, Int64Type};
 use arrow::error::ArrowError;
 use serde_json::{Map, Value, json};
 
@@ -14,6 +14,7 @@ use crate::dataset::export::language;
 use crate::dataset::files::info::{BY_MODEL, Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::relabel::RelabelSummary;
+use crate::dataset::relabel::columns::with_columns;
 use crate::dataset::relabel::tables::{EpisodeNames, Written};
 use crate::dataset::schema::META_EPISODES;
 use crate::dataset::statistics::Statistics;
@@ -140,16 +141,7 @@ fn with_labels(
         let list = lists(&field, some(values, &range))?;
         columns.push((field, list));
     }
-    let schema = rows.schema();
-    let mut all: Vec<(Arc<Field>, ArrayRef)> = schema.fields().iter().cloned().zip(rows.columns().to_vec()).collect();
-    for (field, array) in columns {
-        match all.iter_mut().find(|(known, _)| known.name() == field.name()) {
-            Some(known) => *known = (Arc::new(field), array),
-            None => all.push((Arc::new(field), array)),
-        }
-    }
-    let (fields, arrays): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-    RecordBatch::try_new(Arc::new(Schema::new(fields).with_metadata(schema.metadata().clone())), arrays)
+    with_columns(rows, columns)
 }
 
 /// Some rows of lists.
