@@ -34,6 +34,7 @@ mod recovery;
 mod run;
 mod seen;
 mod source;
+mod start;
 mod sub_task;
 
 pub use batch::{Group, Part, draw};
@@ -62,6 +63,7 @@ use crate::trace::SpecificationForm;
 use crate::training::detector::DetectorRun;
 use crate::training::run::Run;
 use crate::training::source::{Facts, facts_of};
+use crate::training::start::Start;
 
 /// Name of the learning curves in a model's folder.
 pub const METRICS_FILE: &str = "metrics.parquet";
@@ -93,6 +95,24 @@ pub struct TrainSummary {
     pub resumed_at: u32,
     /// The learning curves.
     pub metrics: Vec<Metric>,
+}
+
+/// Where a training happens.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'p> {
+    /// What computes it.
+    pub device: ComputeDevice,
+    /// The model's folder.
+    pub folder: &'p Path,
+    /// The folder of the model whose weights it begins with, where [`TrainConfig::start_from`] asks for one.
+    pub start: Option<&'p Path>,
+}
+
+impl<'p> Place<'p> {
+    /// On the processor, from weights that are drawn.
+    pub fn new(folder: &'p Path) -> Self {
+        Self { device: ComputeDevice::Cpu, folder, start: None }
+    }
 }
 
 /// What a training tells its caller, and asks it.
@@ -129,22 +149,24 @@ pub fn train_on_pictures(
     folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
-    train_from(ComputeDevice::Cpu, training, Source::Here(data, gallery), folder, hooks)
+    train_at(Place::new(folder), training, Source::Here(data, gallery), hooks)
 }
 
-/// The same on a device, also from trials on disk. A model that was trained elsewhere than on the processor says so.
+/// The same on a device, from the weights of another model, or from trials on disk. A model that was trained elsewhere
+/// than on the processor says so.
 ///
 /// # Errors
 ///
-/// As [`train_on_pictures`]; [`TrainError::Device`] when the device cannot be used; and for a detector of trials on disk.
-pub fn train_from(
-    on: ComputeDevice,
+/// As [`train_on_pictures`]; [`TrainError::Device`] when the device cannot be used; for a detector of trials on disk; and
+/// when the weights to begin with are of another network.
+pub fn train_at(
+    place: Place<'_>,
     training: &Training,
     source: Source<'_>,
-    folder: &Path,
     hooks: &mut Hooks<'_>,
 ) -> Result<TrainSummary, TrainError> {
     training.check()?;
+    let Place { device: on, folder, start } = place;
     let size = source.picture_size();
     if training.variant.sees() && size.is_none() {
         let found = training.variant.to_string();
@@ -161,9 +183,11 @@ pub fn train_from(
     if !on.is_cpu() {
         facts.check_one_family(&format!("{} on {on}", training.variant))?;
     }
+    let start = start.map(|start| Start::load(start, &model)).transpose()?;
     let device = on.open()?.autodiff();
     let seed = Seed(training.seed).derive("train", &[]);
-    let learning = Learning { on, config: &training.config, source, facts: &facts, model: &model, folder, seed, hooks };
+    let config = &training.config;
+    let learning = Learning { on, config, source, facts: &facts, model: &model, folder, start, seed, hooks };
     with_network(&model, seed, &device, learning)?
 }
 
@@ -256,6 +280,7 @@ struct Learning<'r, 'h> {
     facts: &'r Facts,
     model: &'r ModelConfig,
     folder: &'r Path,
+    start: Option<Start>,
     seed: Seed,
     hooks: &'r mut Hooks<'h>,
 }
@@ -264,11 +289,16 @@ impl NetworkUse for Learning<'_, '_> {
     type Output = Result<TrainSummary, TrainError>;
 
     fn run<N: Network>(self, network: N) -> Self::Output {
-        let Self { on, config, source, facts, model, folder, seed, hooks } = self;
+        let Self { on, config, source, facts, model, folder, start, seed, hooks } = self;
+        let has_begun = start.is_some();
+        let network = match start {
+            Some(start) => start.fill(network)?,
+            None => network,
+        };
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
         let source = if model.variant.sees() { source } else { source.without_pictures() };
         let (specification, scoping) = (model.network.specification(), network.scoping());
-        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, seed };
+        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, has_begun, seed };
         let (network, trained) = run.train(network, hooks)?;
         write(folder, model, on, &network, &trained.standing.metrics)?;
         run.checkpoints().clear()?;
@@ -280,7 +310,7 @@ impl NetworkUse for Learning<'_, '_> {
         self,
         network: Detecting<D, N>,
     ) -> Self::Output {
-        let Self { on, config, source, facts, model, folder, seed, hooks } = self;
+        let Self { on, config, source, facts, model, folder, start: _, seed, hooks } = self;
         let Source::Here(data, Some(gallery)) = source else {
             return Err(TrainError::Config {
                 key: "variant",
@@ -296,7 +326,8 @@ impl NetworkUse for Learning<'_, '_> {
         let grain = if N::IS_RECURRENT { Grain::Call } else { Grain::Decision };
         let (specification, scoping) = (SpecificationForm::Trajectories, programmer.scoping());
         let (source, facts) = (Source::Here(&detected, None), &facts_of(&detected)?);
-        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, seed };
+        let has_begun = false;
+        let run = Run { on, config, source, facts, specification, scoping, grain, model, folder, has_begun, seed };
         let (programmer, trained) = run.train(programmer, hooks)?;
         detector_metrics::write(&folder.join(DETECTOR_METRICS_FILE), &standing.metrics)?;
         let network = Detecting::new(detector, programmer, data.n_slots);

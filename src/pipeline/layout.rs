@@ -1,6 +1,6 @@
 //! Where everything lies under a run directory.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::artifact::StageDir;
 use crate::pipeline::ModelSpec;
@@ -58,6 +58,22 @@ impl RunDir {
     /// `models/<variant>[-instructions][-<tag>][-tasks<n>]-seed<k>/`.
     pub fn model(&self, name: &str) -> StageDir {
         self.stage(Stage::Train, &format!("models/{name}"))
+    }
+
+    /// The folder of a stage of this run or another, by its path from this one's.
+    pub(super) fn at(&self, stage: Stage, path: &Path) -> StageDir {
+        let mut folder = self.root.clone();
+        for part in path.components() {
+            match part {
+                Component::CurDir => {}
+                // Of a path that ends in a name, so that the folder is found under the name that it was made by.
+                Component::ParentDir if matches!(folder.components().next_back(), Some(Component::Normal(_))) => {
+                    folder.pop();
+                }
+                other => folder.push(other),
+            }
+        }
+        StageDir::new(stage.name(), folder)
     }
 
     /// `rollouts/<model>-<decoder>/<suite>/`, or `rollouts/oracle/<suite>/`.

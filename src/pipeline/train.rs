@@ -11,10 +11,12 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, gallery, tasks};
 use crate::task::Split;
-use crate::training::{self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Source, TrialStream};
+use crate::training::{self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Place, Source, TrialStream};
 
 /// Boundary frames of a dataset above which trials are streamed from disk: those below take 700 MB at most.
 const MOST_FRAMES: u64 = 1_500_000;
+/// What a plan calls the model that a training begins with.
+const START_INPUT: &str = "start_from";
 /// Raised when the same settings train another model.
 const VERSION: u32 = 1;
 
@@ -83,6 +85,12 @@ impl<'p> Model<'p> {
         }
     }
 
+    /// The model whose weights it begins with.
+    fn start(&self, run: &RunDir) -> Option<StageDir> {
+        let start_from = self.spec.training.start_from.as_ref()?;
+        Some(run.at(Stage::Train, start_from))
+    }
+
     /// What a finished training leaves; checkpoints are not part of it.
     fn result_files(&self) -> impl Iterator<Item = &'static str> {
         let of_detector = self.spec.variant.detects().then_some(DETECTOR_METRICS_FILE);
@@ -116,7 +124,8 @@ impl Unit for Model<'_> {
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
-        self.experiments().into_iter().map(|pipeline| self.run_of(pipeline, run).dataset()).collect()
+        let datasets = self.experiments().into_iter().map(|pipeline| self.run_of(pipeline, run).dataset());
+        datasets.chain(self.start(run)).collect()
     }
 
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {
@@ -127,7 +136,8 @@ impl Unit for Model<'_> {
             };
             Ok((name, self.run_of(pipeline, run).dataset().version()?))
         };
-        self.experiments().into_iter().map(input).collect()
+        let start = self.start(run).map(|start| Ok((START_INPUT.to_owned(), start.version()?)));
+        self.experiments().into_iter().map(input).chain(start).collect()
     }
 
     fn settings(&self) -> Value {
@@ -195,8 +205,10 @@ impl Worker for Trainer<'_> {
         // A twin on another machine that was first leaves nothing to do.
         let should_stop = || job.context.go_on().is_err() || job.is_done(shard).unwrap_or(false);
         let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &should_stop };
-        let on = job.context.options.device;
-        let mut train = |source: Source<'_>| training::train_from(on, &training, source, job.dir.path(), &mut hooks);
+        let start = unit.start(job.context.dir);
+        let start = start.as_ref().map(StageDir::path);
+        let place = Place { device: job.context.options.device, folder: job.dir.path(), start };
+        let mut train = |source: Source<'_>| training::train_at(place, &training, source, &mut hooks);
         let sees = match unit.source {
             LearnsFrom::Experiment(pipeline) if unit.spec.variant.sees() => Some(pipeline),
             LearnsFrom::Experiment(_) | LearnsFrom::Study(_) => None,

@@ -1,5 +1,7 @@
 //! The settings of one training, as they stand in a pipeline file.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +56,9 @@ impl Training {
         if self.config.shared_root && !self.variant.reads_any_family() {
             let found = format!("on for variant {}", self.variant);
             return refuse("shared_root", found, "on with variants that read positions and a demonstration of them");
+        }
+        if self.variant.detects() && self.config.start_from.is_some() {
+            return refuse("start_from", format!("set for variant {}", self.variant), "variants without a detector");
         }
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
@@ -124,6 +129,9 @@ pub struct TrainConfig {
     pub learning_rate: Option<f32>,
     /// Steps in which the learning rate rises from zero.
     pub warmup_steps: u32,
+    /// Steps behind those in which the learning rate stays at its highest, before its cosine begins. None by default.
+    #[serde(skip_serializing_if = "is_none")]
+    pub stable_steps: u32,
     /// The learning rate at the end of its cosine, as a share of the highest.
     pub final_learning_rate: f32,
     /// Largest norm of a step's gradient; a longer one is scaled down to it.
@@ -175,6 +183,10 @@ pub struct TrainConfig {
     /// not trained on. Off by default; for models of several families.
     #[serde(skip_serializing_if = "is_off")]
     pub shared_root: bool,
+    /// Folder of a trained model whose weights this one begins with: of the same variant, widths, slots and programs. A path
+    /// from the run's directory, so `models/NAME`, or `../EXPERIMENT/models/NAME` in a study. Left out, weights are drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_from: Option<PathBuf>,
     /// How a detector is trained before the network behind it; for variants that have one.
     #[serde(skip_serializing_if = "DetectorTraining::is_default")]
     pub detector: DetectorTraining,
@@ -194,6 +206,11 @@ fn is_off(setting: &bool) -> bool {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_none(steps: &u32) -> bool {
+    *steps == 0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
 fn is_zero(setting: &f32) -> bool {
     *setting == 0.0
 }
@@ -205,6 +222,7 @@ impl Default for TrainConfig {
             batch: 32,
             learning_rate: None,
             warmup_steps: 100,
+            stable_steps: 0,
             final_learning_rate: 0.02,
             clip_norm: 5.0,
             pairing: Pairing::default(),
@@ -221,6 +239,7 @@ impl Default for TrainConfig {
             scope_kernel: None,
             relations: false,
             shared_root: false,
+            start_from: None,
             detector: DetectorTraining::default(),
             most_frames_in_memory: None,
             checkpoint_every: 100,
@@ -337,23 +356,25 @@ impl TrainConfig {
         self.detector.n_steps() + self.n_steps()
     }
 
-    /// The learning rate of a step: a straight rise, then a cosine. Zero where none is set or filled in.
+    /// The learning rate of a step: a straight rise, its height for a while, then a cosine. Zero where none is set or
+    /// filled in.
     pub fn learning_rate_at(&self, step: u32) -> f64 {
-        self.annealed(f64::from(self.learning_rate.unwrap_or_default()), step, self.n_steps())
+        self.annealed(f64::from(self.learning_rate.unwrap_or_default()), step, self.n_steps(), self.stable_steps)
     }
 
     /// The same for a step of the detector.
     pub(super) fn detector_learning_rate_at(&self, step: u32) -> f64 {
         let highest = f64::from(self.detector.learning_rate.unwrap_or_default());
-        self.annealed(highest, step, self.detector.n_steps())
+        self.annealed(highest, step, self.detector.n_steps(), 0)
     }
 
-    fn annealed(&self, highest: f64, step: u32, n_steps: u32) -> f64 {
+    fn annealed(&self, highest: f64, step: u32, n_steps: u32, n_stable: u32) -> f64 {
         if step < self.warmup_steps {
             return highest * f64::from(step + 1) / f64::from(self.warmup_steps);
         }
-        let span = n_steps.saturating_sub(self.warmup_steps).max(1);
-        let done = f64::from(step - self.warmup_steps) / f64::from(span);
+        let falls_from = self.warmup_steps.saturating_add(n_stable);
+        let span = n_steps.saturating_sub(falls_from).max(1);
+        let done = f64::from(step.saturating_sub(falls_from)) / f64::from(span);
         let last = f64::from(self.final_learning_rate);
         highest * (last + (1.0 - last) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos()))
     }

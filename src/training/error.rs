@@ -20,6 +20,18 @@ pub enum TrainError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// The model to begin with is of another network.
+    #[error("start_from is {}, whose {field} is {found}; allowed: {allowed}", path.display())]
+    Start {
+        /// Its folder.
+        path: PathBuf,
+        /// What differs, as it stands in `config.json`.
+        field: &'static str,
+        /// As found.
+        found: String,
+        /// As in the network that is to be trained.
+        allowed: String,
+    },
     /// No network can be made with the settings.
     #[error("{}: {}", CONFIG_FILE, .0)]
     Network(#[from] ConfigError),

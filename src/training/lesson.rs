@@ -51,10 +51,16 @@ impl Lesson<'_> {
         Ok(Resumed { learner, standing })
     }
 
-    /// Before the first step.
-    pub(super) fn begin<N: Network>(&self, learner: Learner<N>) -> Result<Resumed<N, Standing>, TrainError> {
+    /// Before the first step, with weights that are as they should be.
+    pub(super) fn first_standing<N: Network>(&self, learner: Learner<N>) -> Resumed<N, Standing> {
         let errors = LevelErrors::new(self.examples.levels().count());
         let standing = Standing { step: 0, examples: 0, dropped_gradients: 0, errors, metrics: Vec::new() };
+        Resumed { learner, standing }
+    }
+
+    /// Before the first step of a network that has learned nothing: it gets to know its pictures.
+    pub(super) fn begin<N: Network>(&self, learner: Learner<N>) -> Result<Resumed<N, Standing>, TrainError> {
+        let Resumed { learner, standing } = self.first_standing(learner);
         let Some(gallery) = self.gallery else { return Ok(Resumed { learner, standing }) };
         let (sample, _) = seen::sample(self.examples.data(), gallery)?;
         let network = learner.module().clone().calibrated(&sample, self.seed.derive("acquainted", &[]))?;

@@ -21,6 +21,8 @@ pub(super) struct Run<'r> {
     pub(super) grain: Grain,
     pub(super) model: &'r ModelConfig,
     pub(super) folder: &'r Path,
+    /// Whether the network has weights that were learned: it is not to get to know its pictures again.
+    pub(super) has_begun: bool,
     pub(super) seed: Seed,
 }
 
@@ -58,7 +60,10 @@ impl Run<'_> {
             let gallery = pictures.as_ref().map(Pictured::as_gallery);
             let until = until.min(self.config.n_steps());
             let lesson = Lesson { config: self.config, examples: &examples, gallery, seed: self.seed, until };
-            let resumed = standing_at.or_else(|learner| lesson.begin(learner))?;
+            let begin = |learner| {
+                if self.has_begun { Ok(lesson.first_standing(learner)) } else { lesson.begin(learner) }
+            };
+            let resumed = standing_at.or_else(begin)?;
             let learned = lesson.learn(resumed, &checkpoints, hooks)?;
             if learned.standing.step >= self.config.n_steps() {
                 break learned;

@@ -16,7 +16,7 @@ use ntp::dataset::{
 };
 use ntp::expert::demonstrate;
 use ntp::model::{
-    ComputeDevice, Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant,
+    Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant,
 };
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
@@ -26,7 +26,7 @@ use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
 use ntp::task::{Family, Split, Task, TaskSet, Trial, initial_state_on, sample, scene_on};
 use ntp::trace::{Actor, Episode, Frame, GripperState, Provenance, SpecificationForm};
-use ntp::training::{Hooks, Source, TrainConfig, Training, TrialStream, train, train_from};
+use ntp::training::{Hooks, Place, Source, TrainConfig, Training, TrialStream, train, train_at};
 
 /// Decodes the pictures of a dataset, episodes in no order, as training does; how many.
 fn load(dataset: &Path) -> usize {
@@ -146,7 +146,7 @@ fn train_steps(source: Source<'_>, folder: &Path) -> f64 {
     let config = TrainConfig { steps: Some(STREAMED_STEPS), checkpoint_every: 10_000, ..TrainConfig::default() };
     let training = Training { variant: Variant::NTP, specification: SpecificationForm::default(), seed: 0, config };
     let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
-    let (summary, secs) = cpu_secs(|| train_from(ComputeDevice::Cpu, &training, source, folder, &mut hooks));
+    let (summary, secs) = cpu_secs(|| train_at(Place::new(folder), &training, source, &mut hooks));
     summary.expect("training goes well").examples as f64 / secs
 }
 

@@ -277,6 +277,37 @@ fn a_changed_setting_redoes_its_stage_and_says_which_setting() {
 }
 
 #[test]
+fn a_model_that_begins_with_another_is_made_after_it_and_again_when_that_one_changes() {
+    let folder = smoke::copy_to("convert");
+    let smoke = std::fs::read_to_string(repository().join("pipelines/smoke.toml")).unwrap();
+    let further = |first: u32, start: &str| {
+        let model = format!(
+            "[[models]]\nvariant = \"ntp\"\ntag = \"further\"\n[models.training]\nsteps = 2\nstart_from = \"{start}\"\n\n\
+             [rollout]"
+        );
+        smoke.replace("steps = 6", &format!("steps = {first}")).replace("[rollout]", &model)
+    };
+    let pipeline = folder.path().join("further.toml");
+    let (path, out) = (pipeline.to_string_lossy(), folder.path().to_string_lossy());
+    let train = |text: String, more: &[&str]| {
+        std::fs::write(&pipeline, text).unwrap();
+        run(&[&["run", path.as_ref(), "--out", out.as_ref(), "--to", "train"], more].concat())
+    };
+    let (code, _, stderr) = train(further(6, "models/ntp-seed0"), &[]);
+    assert_eq!(code, 0, "{stderr}");
+    let (_, stdout, _) = train(further(6, "models/../models/./ntp-seed0"), &["--dry-run"]);
+    assert!(stdout.contains("its setting training changed"), "{stdout}");
+    let (_, stdout, _) = train(further(6, "models/ntp-seed0"), &["--dry-run"]);
+    assert!(stdout.lines().all(|line| line.contains("up to date")), "{stdout}");
+    let (_, stdout, _) = train(further(7, "models/ntp-seed0"), &["--dry-run"]);
+    let line = |start: &str| stdout.lines().find(|line| line.starts_with(start)).unwrap_or_default();
+    assert!(line("train ntp-further").contains("train comes first"), "{stdout}");
+    let (code, _, stderr) = train(further(6, "models/ntp-seed9"), &[]);
+    assert_eq!(code, 1);
+    assert!(stderr.contains("models/ntp-seed9") && stderr.contains("not finished"), "{stderr}");
+}
+
+#[test]
 fn nothing_is_made_of_a_file_with_a_flipped_bit() {
     let folder = smoke::copy_to("report");
     let out = folder.path().to_string_lossy();
@@ -438,6 +469,11 @@ fn settings_of_networks_and_noise_that_cannot_be_are_refused_with_what_is_allowe
         "models[0].training",
         "merge_aside_m is 0.2; allowed: from 0 to 0.1",
     );
+    let model = |more: &'static str| {
+        move |text: &str| text.replace("variant = \"ntp\"", "variant = \"ntp_vid_detector\"").replace("steps = 6", more)
+    };
+    let start = model("start_from = \"models/ntp-seed0\"");
+    check_refused(start, "models[0].training", "start_from is set for variant ntp_vid_detector; allowed: variants");
     let allowed = "noise.frame_m is -0.01; allowed: from 0 to 0.1";
     check_refused(training("noise = { frame_m = -0.01 }"), "models[0].training", allowed);
     let suite = |more: &'static str| move |text: &str| text.replace("episodes = 4", &format!("episodes = 4\n{more}"));

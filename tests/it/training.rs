@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ntp::dataset::{DatasetTrials, TrialData, TrialSpool};
 use ntp::model::{
-    CONFIG_FILE, ComputeDevice, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE,
+    CONFIG_FILE, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE,
 };
 use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
@@ -14,8 +14,8 @@ use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, ObservationNoise, Provenance, Span, SpecificationForm, Vocabulary, instructions};
 use ntp::training::{
-    Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, Source, TrainConfig,
-    TrainError, TrainSummary, Training, TrialStream, draw, train, train_from,
+    Curriculum, Example, Examples, Grain, Hooks, METRICS, METRICS_FILE, Metric, Pairing, Place, Source, TrainConfig,
+    TrainError, TrainSummary, Training, TrialStream, draw, train, train_at,
 };
 
 use crate::kinematic::{KinematicWorld, demonstration, sorting, tower, trial};
@@ -274,6 +274,52 @@ fn weights(training: &Training, data: &DatasetTrials) -> Vec<u8> {
     std::fs::read(folder.path().join(WEIGHTS_FILE)).unwrap()
 }
 
+fn train_from(start: &Path, training: &Training, data: &DatasetTrials, folder: &Path) -> Result<(), TrainError> {
+    let mut hooks = Hooks { on_progress: &mut |_| {}, should_stop: &|| false };
+    let place = Place { start: Some(start), ..Place::new(folder) };
+    train_at(place, training, Source::Here(data, None), &mut hooks).map(|_| ())
+}
+
+#[test]
+fn a_training_begins_with_the_weights_of_another_model_and_refuses_those_of_another_network() {
+    let data = towers();
+    let [first, further, other] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let learned = TrainConfig { steps: Some(60), batch: 8, ..TrainConfig::default() };
+    train_until(&ntp(learned.clone()), &data, first.path(), None).unwrap();
+    // One step of no length: what it ends with is what it began with.
+    let still = TrainConfig { steps: Some(1), learning_rate: Some(1e-30), ..learned.clone() };
+    train_from(first.path(), &ntp(still.clone()), &data, further.path()).unwrap();
+    let read = |folder: &Path| std::fs::read(folder.join(WEIGHTS_FILE)).unwrap();
+    assert!(read(further.path()) == read(first.path()), "it began with other weights");
+    assert_ne!(weights(&ntp(still.clone()), &data), read(first.path()));
+
+    let wider = ntp(TrainConfig { scope_kernel: Some(7), ..still.clone() });
+    let error = train_from(first.path(), &wider, &data, other.path()).unwrap_err().to_string();
+    assert!(error.contains("start_from is") && error.contains("whose network is"), "{error}");
+    assert!(error.contains("\"scope_kernel\":5") && error.contains("\"scope_kernel\":7"), "{error}");
+    let recurrent = Training { variant: Variant::NTP_GRU, ..ntp(still) };
+    let error = train_from(first.path(), &recurrent, &data, other.path()).unwrap_err().to_string();
+    assert!(error.contains("whose variant is ntp; allowed: ntp_gru"), "{error}");
+    let error = train_from(other.path(), &ntp(learned), &data, other.path()).unwrap_err().to_string();
+    assert!(error.contains("config.json"), "{error}");
+}
+
+#[test]
+fn the_learning_rate_rises_stays_and_falls() {
+    let config = TrainConfig {
+        steps: Some(1000),
+        learning_rate: Some(0.002),
+        warmup_steps: 100,
+        stable_steps: 400,
+        final_learning_rate: 0.0,
+        ..TrainConfig::default()
+    };
+    let at = |step: u32| (config.learning_rate_at(step) * 1e6).round();
+    // Half of the rise; its end; the end of the plateau; half of the fall, where a cosine is at its middle.
+    assert_eq!([at(49), at(99), at(500), at(750)], [1000.0, 2000.0, 2000.0, 1000.0]);
+    assert!(at(999) < 1.0);
+}
+
 #[test]
 fn a_loss_that_is_no_number_ends_the_training_with_step_and_level_and_keeps_the_checkpoint_before() {
     let data = towers();
@@ -367,7 +413,7 @@ fn a_training_streamed_from_disk_gives_the_same_bytes_when_it_is_resumed_and_not
             let mut on_progress = |progress: ntp::training::Progress| done.set(progress.step);
             let should_stop = || stop.is_some_and(|stop| done.get() >= stop);
             let mut hooks = Hooks { on_progress: &mut on_progress, should_stop: &should_stop };
-            train_from(ComputeDevice::Cpu, &training, Source::Streamed(&stream, None), folder, &mut hooks)
+            train_at(Place::new(folder), &training, Source::Streamed(&stream, None), &mut hooks)
         };
         let [straight, resumed] = [(); 2].map(|()| tempfile::tempdir().unwrap());
         let whole = train_from_disk(straight.path(), None).unwrap();
