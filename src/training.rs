@@ -224,6 +224,9 @@ fn model(
         if let Some(narrowed) = config.detector.narrowed {
             model.network = model.network.narrowed(narrowed as usize);
         }
+        if config.detector.heat_maps {
+            model.network = model.network.with_heat_maps();
+        }
     }
     if let Some(kernel) = config.scope_kernel {
         check_kernel(kernel, facts.longest)?;

@@ -66,7 +66,7 @@ impl NetworkConfig {
                 ObjectCentricConfig::default(),
             ),
             (_, EncoderKind::DetectedFlattened) => Self::DetectedFlattened(
-                VggDetectorConfig { pixels: 64, narrowed: VggDetectorConfig::NARROWED },
+                VggDetectorConfig { pixels: 64, narrowed: VggDetectorConfig::NARROWED, heat_maps: false },
                 FlattenedConfig::default(),
             ),
         }
@@ -114,6 +114,17 @@ impl NetworkConfig {
         match self {
             Self::DetectedFlattened(config, widths) => {
                 Self::DetectedFlattened(VggDetectorConfig { narrowed, ..config }, widths)
+            }
+            other => other,
+        }
+    }
+
+    /// The same with heat maps above VGG16's convolutions; other widths stay as they are.
+    #[must_use]
+    pub fn with_heat_maps(self) -> Self {
+        match self {
+            Self::DetectedFlattened(config, widths) => {
+                Self::DetectedFlattened(VggDetectorConfig { heat_maps: true, ..config }, widths)
             }
             other => other,
         }

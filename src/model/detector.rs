@@ -10,6 +10,7 @@
 //! Paper, section V-D: a separately trained network that predicts the positions of the N objects.
 
 mod assignment;
+mod heat_maps;
 mod patches;
 mod points;
 mod vgg;

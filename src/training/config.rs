@@ -63,6 +63,9 @@ impl Training {
         if !self.variant.detects() && self.config.detector != DetectorTraining::default() {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
         }
+        if self.config.detector.heat_maps && self.variant.encoder() != EncoderKind::DetectedFlattened {
+            return refuse("detector.heat_maps", format!("on for variant {}", self.variant), "on with ntp_vid_detector_paper");
+        }
         match self.config.colours {
             Some(colours) if !self.variant.encoder().has_colours() => {
                 return refuse(

@@ -19,6 +19,15 @@ pub struct DetectorTraining {
     /// `ntp_vid_detector_paper`: what the widths of VGG16 are divided by, 1 (full width, 138 million parameters at 224
     /// pixels) to 64; by default 8.
     pub narrowed: Option<u32>,
+    /// `ntp_vid_detector_paper`: heat maps above the convolutions, which look for a slot's object everywhere alike, in place
+    /// of the paper's dense layers. Off by default.
+    #[serde(skip_serializing_if = "is_off")]
+    pub heat_maps: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_off(setting: &bool) -> bool {
+    !setting
 }
 
 impl DetectorTraining {
@@ -44,6 +53,7 @@ impl DetectorTraining {
             pictures: self.pictures.or(Some(defaults.pictures)),
             learning_rate: self.learning_rate.or(Some(defaults.learning_rate)),
             narrowed: self.narrowed.or(defaults.narrowed),
+            heat_maps: self.heat_maps,
         }
     }
 

@@ -165,7 +165,7 @@ fn detected_positions_move_with_the_gripper_that_they_are_relative_to() {
     let perception = ColourSlotsConfig { pixels: 64, colours: 12 };
     let points: PointDetector = detector_of(&PointDetectorConfig::of(perception), 8, Seed(1), &Device::flex());
     assert_detections_move_with_the_gripper(&points);
-    let config = VggDetectorConfig { pixels: 64, narrowed: 16 };
+    let config = VggDetectorConfig { pixels: 64, narrowed: 16, heat_maps: false };
     let vgg: VggDetector = detector_of(&config, 8, Seed(1), &Device::flex());
     assert_detections_move_with_the_gripper(&vgg);
 }
@@ -221,20 +221,31 @@ fn no_network_but_one_behind_a_detector_reads_the_gripper_s_state() {
 #[test]
 fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     // Configuration D at full width from 224 pixels has 138 million weights with a last layer of 1000.
-    let config = VggDetectorConfig { pixels: 64, narrowed: 16 };
+    let config = VggDetectorConfig { pixels: 64, narrowed: 16, heat_maps: false };
     let network: VggDetector = detector_of(&config, 8, Seed(1), &Device::flex());
     let channels = [3, 4, 4, 8, 8, 16, 16, 16, 32, 32, 32, 32, 32, 32];
     let convolutions: usize = channels.windows(2).map(|pair| 9 * pair[0] * pair[1] + pair[1]).sum();
     let top = (2 * 2 * 32 * 256 + 256) + (256 * 256 + 256) + (256 * 24 + 24);
     let mean_and_deviation = 64 * 64 * 3 + 1;
     assert_eq!(network.num_params(), convolutions + top + mean_and_deviation);
-    let folder = tempfile::tempdir().unwrap();
-    let detector =
-        DetectorTraining { steps: Some(200), pictures: Some(16), learning_rate: Some(0.002), narrowed: Some(16) };
-    learn(&training(Variant::NTP_VID_DETECTOR_PAPER, 1, detector), &shown(2), folder.path(), None).unwrap();
-    let curve = curve(folder.path());
-    let [begin, end] = [&curve[..5], &curve[195..]].map(|part| part.iter().sum::<f32>() / 5.0);
-    assert!(end < 0.75 * begin, "from {begin} to {end} m");
+    // Above heat maps there are a score for each slot, a plane, and a layer of 64 to x, y and z.
+    let network: VggDetector = detector_of(&VggDetectorConfig { heat_maps: true, ..config }, 8, Seed(1), &Device::flex());
+    let maps = (32 * 8 + 8) + (2 * 3 + 3) + (34 * 64 + 64) + (64 * 3 + 3);
+    assert_eq!(network.num_params(), convolutions + maps + mean_and_deviation);
+    for (heat_maps, share) in [(false, 0.75), (true, 0.75)] {
+        let folder = tempfile::tempdir().unwrap();
+        let detector = DetectorTraining {
+            steps: Some(200),
+            pictures: Some(16),
+            learning_rate: Some(0.002),
+            narrowed: Some(16),
+            heat_maps,
+        };
+        learn(&training(Variant::NTP_VID_DETECTOR_PAPER, 1, detector), &shown(2), folder.path(), None).unwrap();
+        let curve = curve(folder.path());
+        let [begin, end] = [&curve[..5], &curve[195..]].map(|part| part.iter().sum::<f32>() / 5.0);
+        assert!(end < share * begin, "heat maps {heat_maps}: from {begin} to {end} m");
+    }
 }
 
 #[test]
