@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, Int64Array, StringArray};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Int32Array, Int64Array, StringArray};
 use arrow::buffer::{BooleanBuffer, OffsetBuffer, ScalarBuffer};
-use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int64Type};
+use arrow::datatypes::{ArrowNativeType, ArrowPrimitiveType, Float32Type, Float64Type, Int32Type, Int64Type};
 use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
 
 use crate::table::{Column, ColumnKind, Columns, Form, TableError, Value};
@@ -48,19 +48,41 @@ impl NumberRows {
     }
 }
 
-/// Texts one after another, as they lie in a batch.
+/// Texts one after another, as they lie in a batch: each by itself, or by its number among the batch's words.
 #[derive(Clone, Debug)]
-pub(crate) struct TextRows(StringArray);
+pub(crate) struct TextRows {
+    words: StringArray,
+    /// Numbers of words, which are there; `None` where each row has a word of its own.
+    numbers: Option<Int32Array>,
+}
 
 impl TextRows {
+    fn of(array: &ArrayRef) -> Option<Self> {
+        if let Some(texts) = array.as_string_opt::<i32>() {
+            return Some(Self { words: texts.clone(), numbers: None });
+        }
+        let dictionary = array.as_dictionary_opt::<Int32Type>()?;
+        let words = dictionary.values().as_string_opt::<i32>()?.clone();
+        Some(Self { words, numbers: Some(dictionary.keys().clone()) })
+    }
+
     /// The text of a row; empty where there is none.
     pub(crate) fn row(&self, at: usize) -> &str {
-        self.0.value(at)
+        self.get(at).unwrap_or_default()
     }
 
     /// The text of a row that may have none.
     pub(crate) fn get(&self, at: usize) -> Option<&str> {
-        self.0.is_valid(at).then(|| self.0.value(at))
+        let word = self.word(at)?;
+        self.words.is_valid(word).then(|| self.words.value(word))
+    }
+
+    /// The number of a row's word; rows with the same one have the same text. `None` where there is no text.
+    pub(crate) fn word(&self, at: usize) -> Option<usize> {
+        match &self.numbers {
+            None => Some(at),
+            Some(numbers) => numbers.is_valid(at).then(|| numbers.value(at) as usize),
+        }
     }
 }
 
@@ -113,7 +135,7 @@ impl Columns {
 
     fn text_rows(&mut self, name: &str, form: Form) -> Result<TextRows, TableError> {
         let expected = ColumnKind { value: Value::Text, form };
-        self.take_array(name, expected, |_, array| Some(TextRows(array.as_string_opt::<i32>()?.clone())))
+        self.take_array(name, expected, |_, array| TextRows::of(array))
     }
 
     /// Takes lists of floats out.

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch, new_null_array};
+use arrow::datatypes::{DataType, FieldRef, Fields, Schema};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
 };
+use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
 use crate::artifact::IoError;
@@ -71,17 +73,33 @@ impl TableReader {
         guarded(path, || Self::open_unguarded(path, schema, names))
     }
 
+    /// The same for batches alone: their texts come as numbers of words, as they mostly lie in the file.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`].
+    pub(crate) fn open_batches(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
+        guarded(path, || Self::open_metadata(path, schema, columns_named(schema, names), by_words))
+    }
+
     fn open_unguarded(path: &Path, schema: &TableSchema, names: &[&str]) -> Result<Self, TableError> {
-        let columns = schema.columns();
-        let named = |name: &&str| columns.iter().find(|(column, _)| column == name).cloned();
-        Self::open_kinds(path, schema, names.iter().filter_map(named).collect())
+        Self::open_kinds(path, schema, columns_named(schema, names))
     }
 
     fn open_kinds(path: &Path, schema: &TableSchema, columns: Vec<(String, ColumnKind)>) -> Result<Self, TableError> {
+        Self::open_metadata(path, schema, columns, Ok)
+    }
+
+    fn open_metadata(
+        path: &Path,
+        schema: &TableSchema,
+        columns: Vec<(String, ColumnKind)>,
+        form: impl Fn(ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError>,
+    ) -> Result<Self, TableError> {
         let file = File::open(path).map_err(IoError::system("open", path))?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder =
-            ParquetRecordBatchReaderBuilder::try_new_with_options(file, options).map_err(TableError::parquet(path))?;
+        let metadata = ArrowReaderMetadata::load(&file, options).and_then(form).map_err(TableError::parquet(path))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
         let fields = builder.metadata().file_metadata().schema().get_fields();
         let is_there = |name: &str| !schema.is_later(name) || fields.iter().any(|field| field.name() == name);
         let (there, absent): (Vec<_>, Vec<_>) = columns.iter().cloned().partition(|(name, _)| is_there(name));
@@ -196,6 +214,26 @@ impl Iterator for TableReader {
     fn next(&mut self) -> Option<Self::Item> {
         self.next_columns().transpose()
     }
+}
+
+/// Columns of a table by name; those that it does not have are left out.
+fn columns_named(schema: &TableSchema, names: &[&str]) -> Vec<(String, ColumnKind)> {
+    let columns = schema.columns();
+    let named = |name: &&str| columns.iter().find(|(column, _)| column == name).cloned();
+    names.iter().filter_map(named).collect()
+}
+
+/// The same file with its texts as numbers of words.
+fn by_words(metadata: ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError> {
+    let words = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+    let field = |field: &FieldRef| match field.data_type() {
+        DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(words())),
+        _ => Arc::clone(field),
+    };
+    let fields: Fields = metadata.schema().fields().iter().map(field).collect();
+    let schema = Schema::new_with_metadata(fields, metadata.schema().metadata().clone());
+    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true).with_schema(Arc::new(schema));
+    ArrowReaderMetadata::try_new(Arc::clone(metadata.metadata()), options)
 }
 
 /// Every column of a file, in order, with what it holds; `None` for a kind that no table of ours has.

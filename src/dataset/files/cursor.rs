@@ -121,7 +121,7 @@ impl<B: Batch> Cursor<B> {
 
     fn open_file(&self, place: FilePlace) -> Result<OpenFile<B>, DatasetError> {
         let path = place.in_dataset(&self.root, self.folder);
-        let reader = TableReader::open_columns(&path, &B::SCHEMA, B::COLUMNS)?;
+        let reader = TableReader::open_batches(&path, &B::SCHEMA, B::COLUMNS)?;
         Ok(OpenFile { place, reader, batch: None, at: 0, row: None })
     }
 }
