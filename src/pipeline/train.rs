@@ -11,7 +11,9 @@ use crate::pipeline::layout::model_name;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, gallery, tasks};
 use crate::task::Split;
-use crate::training::{self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Place, Source, TrialStream};
+use crate::training::{
+    self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Place, Source, TrialStream,
+};
 
 /// Boundary frames of a dataset above which trials are streamed from disk: those below take 700 MB at most.
 const MOST_FRAMES: u64 = 1_500_000;

@@ -64,7 +64,11 @@ impl Training {
             return refuse("detector", format!("set for variant {}", self.variant), "variants with a detector");
         }
         if self.config.detector.heat_maps && self.variant.encoder() != EncoderKind::DetectedFlattened {
-            return refuse("detector.heat_maps", format!("on for variant {}", self.variant), "on with ntp_vid_detector_paper");
+            return refuse(
+                "detector.heat_maps",
+                format!("on for variant {}", self.variant),
+                "on with ntp_vid_detector_paper",
+            );
         }
         match self.config.colours {
             Some(colours) if !self.variant.encoder().has_colours() => {

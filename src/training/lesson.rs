@@ -4,7 +4,8 @@ use crate::model::Network;
 use crate::seed::Seed;
 use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
 use crate::training::curriculum::LevelErrors;
-use crate::training::learner::{Stepped, group_losses};
+use crate::training::learner::Stepped;
+use crate::training::losses::group_losses;
 use crate::training::merged::Merged;
 use crate::training::{
     Examples, Gallery, Group, Hooks, Learner, Losses, Metric, Part, Progress, TrainConfig, TrainError, draw, seen,

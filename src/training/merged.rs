@@ -18,7 +18,7 @@ use crate::program::Program;
 use crate::trace::ScopingLabel;
 use crate::training::batch::{Group, Part};
 use crate::training::config::LossWeights;
-use crate::training::learner::Losses;
+use crate::training::losses::Losses;
 
 /// Losses of each mini-batch: program, end, scope and argument.
 const N_LOSSES: usize = 4;

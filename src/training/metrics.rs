@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::program::Program;
 use crate::table::{TableError, TableRows as _, table};
-use crate::training::learner::Losses;
+use crate::training::losses::Losses;
 
 table! {
     /// `metrics.parquet` of a model: its learning curves, a row a logged step and level.

@@ -15,9 +15,7 @@ use ntp::dataset::{
     ConvertConfig, DatasetTrials, EpisodePictures, RecordingEpisodes, TrialData, TrialSpool, convert, read_trials,
 };
 use ntp::expert::demonstrate;
-use ntp::model::{
-    Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant,
-};
+use ntp::model::{Convolved, ConvolvedConfig, Decoder, FlatEncoder, Network as _, Ntp, Pictures, Variant};
 use ntp::recording::{RecordingError, ShardReader, ShardWriter};
 use ntp::render::{Camera, CameraConfig, Look, PictureFormat, Renderer, Viewpoint};
 use ntp::robot::{Action, RobotApi as _, RobotKind};

@@ -229,7 +229,8 @@ fn a_detector_of_vgg16_s_shape_has_its_layers_and_learns() {
     let mean_and_deviation = 64 * 64 * 3 + 1;
     assert_eq!(network.num_params(), convolutions + top + mean_and_deviation);
     // Above heat maps there are a score for each slot, a plane, and a layer of 64 to x, y and z.
-    let network: VggDetector = detector_of(&VggDetectorConfig { heat_maps: true, ..config }, 8, Seed(1), &Device::flex());
+    let network: VggDetector =
+        detector_of(&VggDetectorConfig { heat_maps: true, ..config }, 8, Seed(1), &Device::flex());
     let maps = (32 * 8 + 8) + (2 * 3 + 3) + (34 * 64 + 64) + (64 * 3 + 3);
     assert_eq!(network.num_params(), convolutions + maps + mean_and_deviation);
     for (heat_maps, share) in [(false, 0.75), (true, 0.75)] {

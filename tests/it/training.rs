@@ -4,9 +4,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use ntp::dataset::{DatasetTrials, TrialData, TrialSpool};
-use ntp::model::{
-    CONFIG_FILE, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE,
-};
+use ntp::model::{CONFIG_FILE, Decoder, ModelConfig, ScopingKind, SpecificationRows, Variant, WEIGHTS_FILE};
 use ntp::program::Program;
 use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::scene::SlotIndex;
