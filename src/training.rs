@@ -26,6 +26,7 @@ mod detector_config;
 mod detector_metrics;
 mod error;
 mod examples;
+mod facts;
 mod flat;
 mod learner;
 mod lesson;
@@ -37,6 +38,7 @@ mod run;
 mod seen;
 mod source;
 mod start;
+mod stream;
 mod sub_task;
 
 pub use batch::{Group, Part, draw};
@@ -49,7 +51,8 @@ pub use learner::{Learner, Stepped};
 pub use losses::{Losses, losses};
 pub use metrics::{Metric, SCHEMA as METRICS};
 pub use seen::{Galleries, Gallery};
-pub use source::{Source, TrialStream};
+pub use source::Source;
+pub use stream::TrialStream;
 
 use std::path::Path;
 
@@ -64,8 +67,8 @@ use crate::model::{
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
 use crate::training::detector::DetectorRun;
+use crate::training::facts::{Facts, facts_of};
 use crate::training::run::Run;
-use crate::training::source::{Facts, facts_of};
 use crate::training::start::Start;
 
 /// Name of the learning curves in a model's folder.

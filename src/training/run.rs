@@ -6,8 +6,9 @@ use crate::model::{ComputeDevice, ModelConfig, Network, ScopingKind};
 use crate::seed::Seed;
 use crate::trace::SpecificationForm;
 use crate::training::checkpoint::{Checkpoints, Resumed, Standing};
+use crate::training::facts::Facts;
 use crate::training::lesson::Lesson;
-use crate::training::source::{Facts, Held, Pictured, Source};
+use crate::training::source::{Held, Pictured, Source};
 use crate::training::{Examples, Grain, Hooks, Learner, TrainConfig, TrainError, TrainSummary};
 
 /// A training with everything settled but its network.
