@@ -16,6 +16,7 @@ pub mod progress;
 pub mod scene;
 pub mod seed;
 pub mod table;
+pub mod words;
 
 pub mod annotate;
 pub mod cluster;

@@ -6,6 +6,7 @@ use std::io::{IsTerminal as _, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use crate::words::{counted, noun};
 use cpu_time::ProcessTime;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -38,28 +39,30 @@ impl Plain {
 }
 
 impl Progress {
-    /// Progress of the work `name` over `total` of `what` (`episodes`, `steps`), shown on stderr.
+    /// Progress of the work `name` over `total` of `what` (`episode`, `step`), shown on stderr.
     pub fn new(name: &str, total: u64, what: &str) -> Self {
         if !std::io::stderr().is_terminal() {
             return Self::plain(name, total, what, LINE_EVERY, Box::new(std::io::stderr()));
         }
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+        let what = noun(total, what);
         if let Ok(style) = ProgressStyle::with_template(&format!(
             "{{prefix:<28}} {{bar:32}} {{pos}}/{{len}} {what}  {{elapsed}} (left {{eta}})  {{msg}}"
         )) {
             bar.set_style(style.progress_chars("━╸─"));
         }
         bar.set_prefix(name.to_owned());
-        Self { bar, name: name.to_owned(), what: what.to_owned(), plain: None }
+        Self { bar, name: name.to_owned(), what, plain: None }
     }
 
     /// Progress told in lines: one at once, then at most one in `every`, one at the end.
     fn plain(name: &str, total: u64, what: &str, every: Duration, out: Box<dyn Write + Send>) -> Self {
         let began = now();
         let mut plain = Plain { began, before: 0, said: began, every, out };
-        plain.say(&format!("{name}: {total} {what}"));
+        plain.say(&format!("{name}: {}", counted(total, what)));
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
-        Self { bar, name: name.to_owned(), what: what.to_owned(), plain: Some(Mutex::new(plain)) }
+        let what = noun(total, what);
+        Self { bar, name: name.to_owned(), what, plain: Some(Mutex::new(plain)) }
     }
 
     /// Progress that is not shown.
@@ -198,7 +201,7 @@ mod tests {
 
     fn plain(every: Duration) -> (Progress, Said) {
         let said = Said::default();
-        (Progress::plain("generate", 4, "episodes", every, Box::new(said.clone())), said)
+        (Progress::plain("generate", 4, "episode", every, Box::new(said.clone())), said)
     }
 
     #[test]

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::cluster::submission::{About, Chain, ClusterError, Engine, SubmitOptions};
 use crate::pipeline::{PipelineFile, Stage};
+use crate::words::shell_word;
 
 /// Does a line of a list of items; the same for every engine.
 pub(super) const TASK: &str = include_str!("task.sh");
@@ -41,11 +42,11 @@ pub(super) fn submit(
     chains: &[Chain],
     options: &SubmitOptions,
 ) -> Result<String, ClusterError> {
-    let place = |pipeline: &std::path::Path| quoted(&format!("submit/pipeline/{}", pipeline.display()));
+    let place = |pipeline: &std::path::Path| shell_word(&format!("submit/pipeline/{}", pipeline.display()));
     let chain = |chain: &Chain| {
         let left = |stage| chain.stages.iter().find(|own| own.stage == stage).map_or(0, |own| own.items);
         ChainContext {
-            folder: quoted(&chain.folder),
+            folder: shell_word(&chain.folder),
             pipeline: place(&chain.pipeline),
             tasks: left(Stage::Tasks),
             generate: left(Stage::Generate),
@@ -58,7 +59,7 @@ pub(super) fn submit(
     let context = Context {
         slurm: options.engine == Engine::Slurm,
         max_running: options.max_running.map(|most| most.to_string()).unwrap_or_default(),
-        sbatch_args: options.sbatch_args.iter().map(|argument| quoted(argument)).collect(),
+        sbatch_args: options.sbatch_args.iter().map(|argument| shell_word(argument)).collect(),
         chains: chains.iter().map(chain).collect(),
         study: match file {
             PipelineFile::Experiment(_) => String::new(),
@@ -70,26 +71,4 @@ pub(super) fn submit(
     templates.set_lstrip_blocks(true);
     templates.set_keep_trailing_newline(true);
     Ok(templates.render_named_str("submit.sh", TEMPLATE, context)?)
-}
-
-/// A word that bash reads as it is.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,@%+".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn words_are_quoted_where_bash_would_read_them_otherwise() {
-        assert_eq!(quoted("pipelines/a.toml"), "pipelines/a.toml");
-        assert_eq!(quoted("--time=1:00"), "--time=1:00");
-        assert_eq!(quoted("it's $HOME"), "'it'\\''s $HOME'");
-        assert_eq!(quoted(""), "''");
-    }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 /// The modules in reading order: each may use those before it and none after it. `rollout` and `trace` use the task's
 /// types; `task` names no later module.
 const ORDER: &[&str] = &[
+    "words",
     "feature",
     "geometry",
     "seed",
