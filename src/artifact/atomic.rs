@@ -27,6 +27,14 @@ pub enum IoError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// There is something at the place of a file that is none: renamed over, a device or a pipe would be gone.
+    #[error("cannot write {}: it is {found}; allowed: a new name, or the name of a file", path.display())]
+    NoFile {
+        /// Where.
+        path: PathBuf,
+        /// What is there.
+        found: &'static str,
+    },
     /// The content is not the JSON it should be.
     #[error("{}:{}:{}: {source}", path.display(), source.line(), source.column())]
     Json {
@@ -41,7 +49,7 @@ impl IoError {
     /// The file that it is about.
     pub fn path(&self) -> &Path {
         match self {
-            Self::System { path, .. } | Self::Json { path, .. } => path,
+            Self::System { path, .. } | Self::NoFile { path, .. } | Self::Json { path, .. } => path,
         }
     }
 
@@ -62,12 +70,14 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Begins a file that shall be at `path`; its folder is made if needed.
+    /// Begins a file that shall be at `path`, or where a link there leads; its folder is made if needed.
     ///
     /// # Errors
     ///
-    /// When folder or temporary file cannot be made.
+    /// [`IoError::NoFile`] when there is something at `path` that is no file; or when folder or temporary file cannot be
+    /// made.
     pub fn create(path: &Path) -> Result<Self, IoError> {
+        let path = &behind_link(path)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         create_dir(folder)?;
         let file = tempfile::Builder::new()
@@ -115,6 +125,32 @@ impl AtomicFile {
         set_usual_permissions(file.as_file()).map_err(IoError::system("set permissions of", &path))?;
         Ok((file, path, unfinished))
     }
+}
+
+/// Where the file of a name lies: behind a link, which stays as it is.
+fn behind_link(path: &Path) -> Result<PathBuf, IoError> {
+    // Of what is not there, or behind a link that leads nowhere, there is nothing to spare.
+    let Ok(metadata) = std::fs::metadata(path) else { return Ok(path.to_owned()) };
+    if !metadata.is_file() {
+        return Err(IoError::NoFile { path: path.to_owned(), found: kind_of(&metadata) });
+    }
+    if path.is_symlink() { path.canonicalize().map_err(IoError::system("find", path)) } else { Ok(path.to_owned()) }
+}
+
+/// What is no file, in words.
+fn kind_of(metadata: &std::fs::Metadata) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        let kind = metadata.file_type();
+        if kind.is_fifo() {
+            return "a pipe";
+        }
+        if kind.is_char_device() || kind.is_block_device() {
+            return "a device";
+        }
+    }
+    if metadata.is_dir() { "a folder" } else { "no file" }
 }
 
 /// A temporary file is made for its owner alone; a result is for everyone.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::artifact::{IoError, sha256_file};
+use crate::words::counted;
 
 /// One file of a shard or stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,7 +81,7 @@ pub enum ContractError {
         path: PathBuf,
     },
     /// Shards are missing.
-    #[error("{stage}: {} of {total} shards have no receipt, the first is {}", missing.len(), missing.first().copied().unwrap_or(0))]
+    #[error("{stage}: {} of {total} have no receipt, the first is {}", missing.len(), missing.first().copied().unwrap_or(0), total = counted(*total, "shard"))]
     MissingShards {
         /// The stage.
         stage: String,

@@ -13,6 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use crate::artifact::sha256_bytes;
+use crate::words::counted;
 
 /// Version of plans, receipts and manifests.
 pub(super) const CONTRACT_VERSION: u32 = 1;
@@ -95,7 +96,7 @@ impl Plan {
                 None => "its settings changed".to_owned(),
             });
         }
-        (*shards != new.shards).then(|| format!("it had {shards} shards, now there are {}", new.shards))
+        (*shards != new.shards).then(|| format!("it had {}, now it has {}", counted(*shards, "shard"), new.shards))
     }
 }
 

@@ -13,6 +13,7 @@ use crate::artifact::plan::CONTRACT_VERSION;
 use crate::artifact::{
     ContractError, FileEntry, IoError, Manifest, Plan, Receipt, create_json, read_json, sha256_file, write_json,
 };
+use crate::words::counted;
 
 /// A stage's folder.
 #[derive(Clone, Debug)]
@@ -292,7 +293,11 @@ impl StageDir {
             metadata => metadata.map_err(IoError::system("read", &path))?,
         };
         if metadata.len() != expected.bytes {
-            return Err(differs(format!("{} bytes, but its manifest says {}", metadata.len(), expected.bytes)));
+            return Err(differs(format!(
+                "{}, but its manifest says {}",
+                counted(metadata.len(), "byte"),
+                expected.bytes
+            )));
         }
         if deep {
             let found = sha256_file(&path)?;

@@ -16,6 +16,12 @@ pub enum StagingError {
     /// The system refuses.
     #[error(transparent)]
     Io(#[from] IoError),
+    /// There is something under the final name that is no folder.
+    #[error("only a new or empty folder is written, but {} is no folder", path.display())]
+    NoFolder {
+        /// The final name.
+        path: PathBuf,
+    },
     /// There is something under the final name.
     #[error("only a new or empty folder is written, but there is something in {}", path.display())]
     NotEmpty {
@@ -43,6 +49,9 @@ impl StagedDir {
     /// When there is something at `path`, or another process makes the same folder.
     pub fn begin(path: &Path) -> Result<Self, StagingError> {
         let path = &behind_links(path)?;
+        if path.exists() && !path.is_dir() {
+            return Err(StagingError::NoFolder { path: path.to_owned() });
+        }
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let partial = path.with_file_name(format!("{PARTIAL_PREFIX}{name}"));
         let lock = RunLock::take(&partial)?;
@@ -58,6 +67,11 @@ impl StagedDir {
     /// Where to write.
     pub fn partial_path(&self) -> &Path {
         &self.partial
+    }
+
+    /// Where it will be, behind links.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Gives the folder its name.
