@@ -6,7 +6,8 @@ use crate::cli::RepairArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::edit;
-use crate::recording;
+use crate::recording::{self, Lost, Recovery};
+use crate::words::counted;
 
 pub(super) fn run(args: &RepairArgs) -> anyhow::Result<CommandOutcome> {
     if args.to.exists() {
@@ -14,7 +15,8 @@ pub(super) fn run(args: &RepairArgs) -> anyhow::Result<CommandOutcome> {
     }
     match Kind::of(&args.path)? {
         Kind::Dataset => dataset(args),
-        Kind::Recording => recording(args),
+        Kind::Recording if recording::is_own(&args.path) => recording(args),
+        Kind::Recording => others(args),
         kind => {
             let problem =
                 format!("{} is {}; repair takes a dataset or a recording (.mcap)", args.path.display(), kind.name());
@@ -27,7 +29,8 @@ fn dataset(args: &RepairArgs) -> anyhow::Result<CommandOutcome> {
     let repair = edit::repair(&args.path, &args.to)?;
     let Some(written) = &repair.written else { return whole(args, json!(repair)) };
     let lines = repair.reasons.iter().map(|reason| format!("found    {reason}"));
-    let kept = format!("kept     {} episodes, left out {}: {}", written.episodes, written.left_out, args.to.display());
+    let episodes = counted(written.episodes, "episode");
+    let kept = format!("kept     {episodes}, left out {}: {}", written.left_out, args.to.display());
     tell(args, json!(repair), &lines.chain([kept]).collect::<Vec<_>>())?;
     Ok(if written.left_out > 0 { CommandOutcome::LeftOut } else { CommandOutcome::Done })
 }
@@ -42,11 +45,31 @@ fn recording(args: &RepairArgs) -> anyhow::Result<CommandOutcome> {
     };
     let lines = [
         format!("found    {reason}"),
-        format!("kept     {} episodes: {}", repair.kept, args.to.display()),
+        format!("kept     {}: {}", counted(repair.kept, "episode"), args.to.display()),
         "left out whatever came behind them".to_owned(),
         format!("plan     {plan}"),
     ];
     tell(args, json!(repair), &lines)?;
+    Ok(CommandOutcome::LeftOut)
+}
+
+/// A recording of others: what is whole of it, whatever is in it.
+fn others(args: &RepairArgs) -> anyhow::Result<CommandOutcome> {
+    let found = recording::recover(&args.path, &args.to)?;
+    if found.lost.is_empty() {
+        return whole(args, json!(found));
+    }
+    let Recovery { messages, topics, counted: of, attachments, metadata, lost } = &found;
+    let of = of.map(|of| format!(" of {of}")).unwrap_or_default();
+    let others = [(*attachments, "attachment"), (*metadata, "metadata record")];
+    let others: String =
+        others.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!(", {}", counted(n, what))).collect();
+    let messages = counted(*messages, "message");
+    let kept = format!("kept     {messages}{of} on {}{others}: {}", counted(*topics, "topic"), args.to.display());
+    let lines = lost.iter().map(|Lost { offset, bytes, problem }| {
+        format!("lost     {} from byte {offset} on: {problem}", counted(*bytes, "byte"))
+    });
+    tell(args, json!(found), &std::iter::once(kept).chain(lines).collect::<Vec<_>>())?;
     Ok(CommandOutcome::LeftOut)
 }
 

@@ -62,26 +62,37 @@ impl PlanSearch {
 }
 
 /// An attachment: log time, create time, name, media type, length, data, checksum.
-struct Attachment<'a> {
+pub(super) struct Attachment<'a> {
+    times_nanos: [u64; 2],
     name: &'a [u8],
+    media_type: &'a [u8],
     data: &'a [u8],
     saved: u32,
 }
 
 impl<'a> Attachment<'a> {
-    fn parse(record: &'a [u8]) -> Option<Self> {
+    pub(super) fn parse(record: &'a [u8]) -> Option<Self> {
         let (checked, checksum) = record.split_last_chunk()?;
         let mut fields = Fields::new(checked);
-        let (_log_time, _create_time) = (fields.u64()?, fields.u64()?);
-        let (name, _media_type, length) = (fields.text()?, fields.text()?, fields.u64()?);
+        let times_nanos = [fields.u64()?, fields.u64()?];
+        let (name, media_type, length) = (fields.text()?, fields.text()?, fields.u64()?);
         let data = fields.rest();
-        (length == data.len() as u64).then(|| Self { name, data, saved: u32::from_le_bytes(*checksum) })
+        let saved = u32::from_le_bytes(*checksum);
+        (length == data.len() as u64).then_some(Self { times_nanos, name, media_type, data, saved })
     }
 
     /// Holds the record, from which it was parsed, against its checksum. Zero says that there is none.
-    fn check(&self, record: &[u8]) -> Result<(), McapError> {
+    pub(super) fn check(&self, record: &[u8]) -> Result<(), McapError> {
         let saved = self.saved;
         let calculated = if saved == 0 { 0 } else { crc32fast::hash(&record[..record.len() - size_of::<u32>()]) };
         if saved == calculated { Ok(()) } else { Err(McapError::BadAttachmentCrc { saved, calculated }) }
+    }
+
+    /// As the library writes it.
+    pub(super) fn to_mcap(&self) -> mcap::Attachment<'a> {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let [log_time, create_time] = self.times_nanos;
+        let (name, media_type) = (text(self.name), text(self.media_type));
+        mcap::Attachment { log_time, create_time, name, media_type, data: self.data.into() }
     }
 }

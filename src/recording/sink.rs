@@ -18,7 +18,7 @@ use crate::trace::{Episode, Frame};
 /// A chunk is closed by the first message that takes it past this size.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Fixed, because the library's default may change between versions.
-const ZSTD_LEVEL: u32 = 3;
+pub(super) const ZSTD_LEVEL: u32 = 3;
 /// No message or plan of ours is longer.
 const MAX_CONTENT_BYTES: usize = 32 << 20;
 /// Name of the metadata record.

@@ -150,15 +150,8 @@ impl ShardWriter {
         if self.family.is_none() {
             self.declare()?;
         }
-        let mut file = self.sink.close(&self.plan_json).map_err(|error| failed(&self.path, error))?;
-        let io = |action| IoError::system(action, &self.path);
-        let summary = Summary::read(&mut file).map_err(|error| match error {
-            NoSummary::Io(source) => io("read back")(source),
-            // The library has just written it.
-            _ => io("read back the summary of")(std::io::ErrorKind::InvalidData.into()),
-        })?;
-        summary.write_in_order(&mut file).map_err(io("write"))?;
-        file.commit()?;
+        let file = self.sink.close(&self.plan_json).map_err(|error| failed(&self.path, error))?;
+        commit_in_order(file, &self.path)?;
         Ok(self.summary)
     }
 
@@ -210,7 +203,19 @@ fn has_joints(episode: &Episode) -> bool {
     episode.frames.first().is_some_and(|frame| frame.state.joints_rad.is_some())
 }
 
-fn failed(path: &Path, error: McapError) -> RecordingError {
+/// Puts the summary of a file that the library has ended into a fixed order, and gives the file its name.
+pub(super) fn commit_in_order(mut file: AtomicFile, path: &Path) -> Result<(), RecordingError> {
+    let io = |action| IoError::system(action, path);
+    let summary = Summary::read(&mut file).map_err(|error| match error {
+        NoSummary::Io(source) => io("read back")(source),
+        // The library has just written it.
+        _ => io("read back the summary of")(std::io::ErrorKind::InvalidData.into()),
+    })?;
+    summary.write_in_order(&mut file).map_err(io("write"))?;
+    Ok(file.commit()?)
+}
+
+pub(super) fn failed(path: &Path, error: McapError) -> RecordingError {
     match error {
         McapError::Io(source) => IoError::system("write", path)(source).into(),
         error => RecordingError::Write { path: path.to_owned(), source: Box::new(error) },
