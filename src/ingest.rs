@@ -26,6 +26,7 @@ mod counts;
 mod decode;
 mod episode;
 mod error;
+mod few;
 mod map;
 mod observe;
 mod path;

@@ -3,6 +3,7 @@
 use crate::cli::IngestArgs;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::ingest::{Map, ingest, propose};
+use crate::words::counted;
 
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<CommandOutcome> {
     let [first, ..] = args.files.as_slice() else { return Err(UsageError("no recording".to_owned()).into()) };
@@ -20,9 +21,10 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<CommandOutcome> {
         output::print_json(&summary)?;
     } else {
         let (episodes, frames) = (summary.episodes, summary.frames);
-        let mut lines = vec![format!("{episodes} episodes, {frames} frames in {}", to.display())];
+        let mut lines =
+            vec![format!("{}, {} in {}", counted(episodes, "episode"), counted(frames, "frame"), to.display())];
         if summary.cut + summary.empty > 0 {
-            lines.push(format!("{} episodes cut, {} without a row", summary.cut, summary.empty));
+            lines.push(format!("{} cut, {} without a row", counted(summary.cut, "episode"), summary.empty));
         }
         lines.extend(summary.lines());
         output::print(&lines.join("\n"))?;

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::words::counted;
+
 /// What was written, and what became of every message.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct IngestSummary {
@@ -17,6 +19,10 @@ pub struct IngestSummary {
     pub cut: u64,
     /// Bounds between which no row was complete.
     pub empty: u64,
+    /// With `clock = "header"`: how many messages of a topic have no stamp. They were taken at the time at which they
+    /// were recorded.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub without_stamp: BTreeMap<String, u64>,
     /// Each topic that the map names.
     pub topics: BTreeMap<String, TopicCounts>,
 }
@@ -51,16 +57,23 @@ impl TopicCounts {
 }
 
 impl IngestSummary {
-    /// A line for each topic.
+    /// A line for each topic, and one for each whose messages have no stamp where the clock is that of stamps.
     pub fn lines(&self) -> Vec<String> {
+        let unstamped = |(topic, n): (&String, &u64)| {
+            let messages = counted(*n, "message");
+            format!(
+                "{topic}: {messages} without a stamp, taken when recorded: clock = \"header\" holds for none of them"
+            )
+        };
         let line = |(topic, counts): (&String, &TopicCounts)| {
             let TopicCounts { messages, dropped, repeated, out_of_order, late, unusable } = counts;
+            let messages = counted(*messages, "message");
             format!(
-                "{topic}: {messages} messages, {dropped} dropped, {repeated} repeated, {out_of_order} out of order, \
+                "{topic}: {messages}, {dropped} dropped, {repeated} repeated, {out_of_order} out of order, \
                  {late} late, {unusable} unusable"
             )
         };
-        self.topics.iter().map(line).collect()
+        self.topics.iter().map(line).chain(self.without_stamp.iter().map(unstamped)).collect()
     }
 
     /// Whether something that should have been in the dataset is not.

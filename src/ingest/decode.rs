@@ -6,6 +6,7 @@ mod ros2;
 
 use super::value::Value;
 use crate::recording::AnyChannel;
+use crate::words::counted;
 
 pub(super) use json::base64;
 
@@ -42,9 +43,9 @@ impl Decoder {
     /// When it is not as the schema says, in words.
     pub(super) fn decode(&self, data: &[u8]) -> Result<Value, String> {
         match self {
-            Self::Ros2(layout) => {
-                layout.decode(data).ok_or_else(|| format!("its {} bytes are no {}", data.len(), layout.name()))
-            }
+            Self::Ros2(layout) => layout
+                .decode(data)
+                .ok_or_else(|| format!("its {} are no {}", counted(data.len(), "byte"), layout.name())),
             Self::Protobuf(layout) => layout.decode(data),
             Self::Json => json::decode(data),
         }

@@ -97,7 +97,7 @@ pub(super) struct FeatureMap {
     #[serde(default, rename = "match")]
     pub(super) matching: Matching,
     /// How far in time it may be from the row.
-    #[serde(default = "one")]
+    #[serde(default = "usual_age")]
     pub(super) max_age_secs: f64,
     /// How pictures are stored.
     #[serde(default)]
@@ -169,8 +169,11 @@ fn half() -> f64 {
     0.5
 }
 
-fn one() -> f64 {
-    1.0
+/// How far a message may be from its row unless the map says otherwise.
+pub(super) const USUAL_AGE_SECS: f64 = 1.0;
+
+fn usual_age() -> f64 {
+    USUAL_AGE_SECS
 }
 
 fn hundred() -> u32 {

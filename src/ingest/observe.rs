@@ -20,6 +20,7 @@ use crate::geometry::{Vec3, upright};
 use crate::scene::{Body, BodyIndex, Mobility, Scene, SceneState, Shape, Slot, locked_bodies};
 use crate::task::{self, Family};
 use crate::trace::Frame;
+use crate::words::counted;
 
 /// The feature of observations.
 pub(super) const STATE: &str = "observation.state";
@@ -135,8 +136,9 @@ impl Observer {
 
     /// What is wrong with the widths of the sources, if anything.
     pub(super) fn check(widths: &[usize]) -> Result<(), String> {
-        let wrong =
-            |what: &str, found: usize| Err(format!("observations.{what} gives {found} numbers, not x, y and z"));
+        let wrong = |what: &str, found: usize| {
+            Err(format!("observations.{what} gives {found}, not x, y and z", found = counted(found, "number")))
+        };
         match widths {
             [gripper, ..] if *gripper != 3 => wrong("gripper", *gripper),
             [_, _, objects @ ..] => match objects.iter().find(|&&width| width != 3) {

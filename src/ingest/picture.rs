@@ -5,6 +5,7 @@ use super::map::Store;
 use super::value::Value;
 use crate::dataset::plain::Picture;
 use crate::video::{H264Decoder, Rgb, decode_picture, is_key_frame, picture_size};
+use crate::words::counted;
 
 /// What a message shows.
 #[derive(Clone, Debug)]
@@ -61,7 +62,7 @@ fn raw(value: &Value, encoding: &str, data: &[u8]) -> Result<Shown, Reason> {
     let step = number("step").filter(|&step| step > 0).map_or(row_bytes, |step| step as usize);
     let n_bytes = step.saturating_mul(height as usize);
     if row_bytes == 0 || step < row_bytes || data.len() < n_bytes {
-        return Err(format!("{} bytes for {width}x{height} pixels of {encoding}", data.len()));
+        return Err(format!("{} for {width}x{height} pixels of {encoding}", counted(data.len(), "byte")));
     }
     let mut rgb = Vec::with_capacity(3 * width as usize * height as usize);
     for row in data[..n_bytes].chunks_exact(step) {

@@ -12,6 +12,7 @@ use super::picture::packet_size;
 use super::sample::{Content, ContentKind, Sampler};
 use crate::dataset::plain::{Dtype, PlainFeature, PlainKind};
 use crate::recording::read_messages;
+use crate::words::counted;
 
 /// A feature of the map with what it holds.
 pub(super) struct Feature<'m> {
@@ -168,7 +169,12 @@ fn numbers(map: &FeatureMap, found: Vec<String>) -> Result<PlainKind, String> {
     }
     let names = map.names.clone().unwrap_or_else(|| found.clone());
     if names.len() != found.len() {
-        return Err(format!("{} names for {} numbers: {}", names.len(), found.len(), found.join(", ")));
+        return Err(format!(
+            "{} for {}: {}",
+            counted(names.len(), "name"),
+            counted(found.len(), "number"),
+            found.join(", ")
+        ));
     }
     Ok(PlainKind::Numbers(dtype, names))
 }

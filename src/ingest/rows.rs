@@ -165,12 +165,17 @@ impl<'r, 'm> Reading<'r, 'm> {
         self.advance(false)
     }
 
-    fn time(&self, message: &AnyMessage<'_>, value: Option<&Value>) -> i64 {
+    /// When a message is. One that cannot be decoded, of which no row is made, has the time at which it was recorded.
+    fn time(&mut self, message: &AnyMessage<'_>, value: Option<&Value>) -> i64 {
         let whole = |nanos: u64| i64::try_from(nanos).unwrap_or(i64::MAX);
-        match self.map.clock {
-            Clock::Log => whole(message.log_time_nanos),
-            Clock::Publish => whole(message.publish_time_nanos),
-            Clock::Header => value.and_then(Value::stamp_nanos).unwrap_or_else(|| whole(message.log_time_nanos)),
+        let recorded = whole(message.log_time_nanos);
+        match (self.map.clock, value) {
+            (Clock::Publish, _) => whole(message.publish_time_nanos),
+            (Clock::Log, _) | (Clock::Header, None) => recorded,
+            (Clock::Header, Some(value)) => value.stamp_nanos().unwrap_or_else(|| {
+                *self.summary.without_stamp.entry(message.channel.topic.clone()).or_default() += 1;
+                recorded
+            }),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Recordings of robots: rows, episodes and pictures are those of the messages, and every message is accounted for.
 
 mod messages;
+mod recover;
 
 use std::path::{Path, PathBuf};
 
@@ -385,12 +386,70 @@ fn bytes_do_not_depend_on_threads_and_a_proposed_map_can_be_used() {
         let to = case.path(&format!("made-{jobs}"));
         let (code, stdout, stderr) = run(&["ingest", &file, "--map", &map, "--to", &text(to.clone()), "--jobs", jobs]);
         assert_eq!(code, 0, "{stderr}");
-        assert!(stdout.starts_with("1 episodes, 20 frames in "), "{stdout}");
+        assert!(stdout.starts_with("1 episode, 20 frames in "), "{stdout}");
         made.push(messages::files(&to));
     }
     assert!(made[0] == made[1] && made[0].len() == 6, "{:?}", made[0].keys());
     let (code, _, stderr) = run(&["ingest", &file]);
     assert_eq!((code, stderr.contains("--map and --to are needed")), (2, true));
+}
+
+/// A joint every 10 ms for two seconds, and topics with few messages.
+fn with_few() -> Bag {
+    let mut bag = Bag::default();
+    for step in 0..200 {
+        bag.json("/joint", step * 10 * MS, json!({ "position": [step, 1] }));
+    }
+    for (at, value) in [(200, true), (900, false), (1200, true), (1700, false)] {
+        bag.json("/record", at * MS, json!({ "data": value }));
+        bag.json("/gripper/closed", at * MS, json!({ "data": value }));
+        bag.json("/battery", at * MS, json!({ "volts": 12.5 }));
+        bag.json("/overview", at * MS, json!({ "format": "jpeg", "data": base64(&jpeg(7)) }));
+    }
+    bag.json("/task", 0, json!({ "data": "pour \"tea\"" }));
+    bag.sort();
+    bag
+}
+
+#[test]
+fn topics_with_few_messages_bound_episodes_and_are_no_features() {
+    let case = Case::new(&[with_few()]);
+    let map = propose(&case.files()[0]).unwrap();
+    let marker = "[episodes]\nby = \"marker\"\ntopic = \"/record\"\nfield = \"data\"\nstart = true\nend = false\n";
+    assert!(map.contains(marker), "{map}");
+    assert_eq!((map.matches("[[feature]]").count(), map.contains("fps = 100\n")), (1, true), "{map}");
+    for told in [
+        "# /gripper/closed (, 4 messages): too few for rows; as bounds of episodes: by = \"marker\", \
+         topic = \"/gripper/closed\", field = \"data\", start = true, end = false\n",
+        "# /battery (, 4 messages): too few for rows, which take messages of up to 1 s before; max_age_secs",
+        "# /overview (, 4 messages): too few",
+        "# /task (, 1 message): too few for rows; as bounds of episodes: by = \"marker\", topic = \"/task\", \
+         field = \"data\", start = 'pour \"tea\"' or the task: task = { topic = \"/task\", field = \"data\" }\n",
+    ] {
+        assert!(map.contains(told), "{told} is not in\n{map}");
+    }
+    let summary = case.ingest(&map).unwrap();
+    // From 0.2 s up to 0.9 s, and from 1.2 s up to 1.7 s, at 100 Hz.
+    assert_eq!((summary.cut, numbers(&case.episodes(), "length")), (0, vec![70, 50]));
+}
+
+#[test]
+fn messages_without_a_stamp_are_told_where_the_clock_is_that_of_stamps() {
+    let mut bag = clock_like();
+    let stamp = json!({ "sec": 0, "nanosec": 500_000_000 });
+    bag.json("/joint", 1040 * MS, json!({ "header": { "stamp": stamp }, "position": [7.0, 1.0] }));
+    let case = Case::new(&[bag]);
+    let log = case.ingest(&joint_map("last")).unwrap();
+    assert_eq!((log.without_stamp.len(), log.lines().len()), (0, 1));
+    let map = format!("clock = \"header\"\n{}", joint_map("last"));
+    let summary = case.ingest(&map).unwrap();
+    assert_eq!(summary.without_stamp["/joint"], 26);
+    std::fs::remove_dir_all(case.path("dataset")).unwrap();
+    let [file, map, to] =
+        ["bag-0.mcap", "map.toml", "dataset"].map(|name| case.path(name).to_string_lossy().into_owned());
+    let (code, stdout, stderr) = run(&["ingest", &file, "--map", &map, "--to", &to]);
+    assert!(code == 0 || code == 3, "{stderr}");
+    assert!(stdout.contains("/joint: 26 messages without a stamp, taken when recorded"), "{stdout}");
 }
 
 #[test]
