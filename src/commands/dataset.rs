@@ -11,6 +11,7 @@ use crate::dataset::edit::{
 };
 use crate::dataset::export::{ExportSummary, export};
 use crate::dataset::import::{ImportSummary, import};
+use crate::words::counted;
 
 pub(super) fn run(command: &DatasetCommand) -> anyhow::Result<CommandOutcome> {
     match command {
@@ -102,10 +103,16 @@ fn tell(written: &[(&Path, &EditSummary)], as_json: bool) -> anyhow::Result<Comm
         let left_out = if of.left_out > 0 { format!(", {} left out", of.left_out) } else { String::new() };
         let EditSummary { episodes, frames, calls, tasks, .. } = of;
         // Where there are no program tables, none were counted.
-        let calls = if *calls > 0 { format!(", {calls} calls") } else { String::new() };
-        format!("{}: {episodes} episodes{left_out}, {tasks} tasks, {frames} frames{calls}", path.display())
+        let calls = if *calls > 0 { format!(", {}", counted(*calls, "call")) } else { String::new() };
+        let (episodes, tasks) = (counted(*episodes, "episode"), counted(*tasks, "task"));
+        format!("{}: {episodes}{left_out}, {tasks}, {}{calls}", path.display(), counted(*frames, "frame"))
     };
     output::print(&written.iter().map(line).collect::<Vec<_>>().join("\n"))?;
+    for (path, EditSummary { without_statistics, .. }) in
+        written.iter().filter(|(_, of)| !of.without_statistics.is_empty())
+    {
+        output::note(&format!("{}: without statistics: {}", path.display(), without_statistics.join(", ")));
+    }
     Ok(CommandOutcome::Done)
 }
 
@@ -126,7 +133,12 @@ fn run_export(args: &ExportArgs) -> anyhow::Result<CommandOutcome> {
         output::print_json(&json!({ "path": args.to, "labels": args.labels, "summary": written }))?;
     } else {
         let ExportSummary { episodes, labels } = written;
-        output::print(&format!("{}: {labels} labels of {episodes} episodes", args.to.display()))?;
+        output::print(&format!(
+            "{}: {} of {}",
+            args.to.display(),
+            counted(labels, "label"),
+            counted(episodes, "episode")
+        ))?;
     }
     Ok(CommandOutcome::Done)
 }
@@ -138,10 +150,13 @@ fn run_import(args: &ImportArgs) -> anyhow::Result<CommandOutcome> {
         output::print_json(&json!({ "path": args.to, "summary": written }))?;
     } else {
         let ImportSummary { episodes, frames, calls, subtasks, cut, .. } = written;
-        let text = format!("{episodes} episodes, {frames} frames, {calls} calls of {subtasks} sub-tasks");
-        output::print(&format!("{}: {text}", args.to.display()))?;
+        let text = [(episodes, "episode"), (frames, "frame"), (calls, "call")].map(|(n, of)| counted(n, of)).join(", ");
+        output::print(&format!("{}: {text} of {}", args.to.display(), counted(subtasks, "sub-task")))?;
         if cut > 0 {
-            output::note(&format!("{cut} labels shared frames with others of their level, or lay behind the end: cut"));
+            output::note(&format!(
+                "cut, for sharing frames with another of its level or lying behind the end: {}",
+                counted(cut, "label")
+            ));
         }
     }
     Ok(CommandOutcome::Done)
@@ -173,8 +188,11 @@ fn changes(of: &ChangedEpisode) -> String {
         parts.push(format!("calls {}", ids.join(", ")));
     }
     if of.scopes > 0 {
-        parts.push(format!("{} scoping labels", of.scopes));
+        parts.push(counted(of.scopes, "scoping label"));
     }
-    parts.extend(of.frames.iter().map(|(column, frames)| format!("{column} in {frames} frames")));
+    parts.extend(of.frames.iter().map(|(column, frames)| format!("{column} in {}", counted(*frames, "frame"))));
+    if parts.is_empty() {
+        parts.push("how its columns are written".to_owned());
+    }
     parts.join("; ")
 }

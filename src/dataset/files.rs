@@ -9,3 +9,4 @@ pub(crate) mod info;
 pub(crate) mod layout;
 pub(crate) mod pointer;
 pub(crate) mod rolling;
+pub(crate) mod stated;

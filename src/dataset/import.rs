@@ -28,12 +28,13 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::artifact::{IoError, StagedDir, write_json};
+use crate::artifact::{IoError, StagedDir, read, write_json};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
 use crate::dataset::files::info::{LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout;
+use crate::dataset::files::stated::{is_of_numbers, read_statistics};
 use crate::dataset::plain::{DeclaredKind, LabelsForm, PlainInfo, PlainLabels, PlainSource, PlainTexts};
 use crate::dataset::tables::annotated::vocabulary;
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
@@ -96,12 +97,21 @@ pub fn import(root: &Path, form: Option<LabelsForm>, to: &Path) -> Result<Import
     }
     let stats = root.join(layout::STATS);
     if stats.is_file() {
-        std::fs::copy(&stats, folder.join(layout::STATS)).map_err(IoError::system("copy", &stats))?;
+        copy_statistics(&stats, &folder.join(layout::STATS))?;
     }
     write_infos(&source, form, &texts, summary, folder)?;
     copy_folder(&root.join(layout::VIDEOS), &folder.join(layout::VIDEOS))?;
     staged.commit()?;
     Ok(summary)
+}
+
+/// Copies statistics as they are, or those of them that are numbers where others are not.
+fn copy_statistics(path: &Path, to: &Path) -> Result<(), IoError> {
+    let is_whole = serde_json::from_slice(&read(path)?).is_ok_and(|of: Value| is_of_numbers(&of));
+    match is_whole {
+        true => std::fs::copy(path, to).map(|_bytes| ()).map_err(IoError::system("copy", path)),
+        false => write_json(to, &read_statistics(path)?),
+    }
 }
 
 fn check_version(info: &PlainInfo) -> Result<(), EditError> {

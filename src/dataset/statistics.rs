@@ -3,6 +3,8 @@
 //! Mean and deviation of the whole are merged from the episodes'. Quantiles cannot be merged: all numbers are kept, in a
 //! temporary file where they are many, and selected from there, see [`quantile`]. `LeRobot` samples and takes an envelope instead.
 //!
+//! Numbers that are none (NaN, infinite) are left out, dimension by dimension: readers demand statistics that are numbers.
+//!
 //! Deviation is that of the population, quantiles are interpolated linearly between the two nearest values. Episodes
 //! have no quantiles of their own: `LeRobot`'s readers do without, and of some twenty values they would say little.
 
@@ -51,7 +53,10 @@ pub(crate) struct FeatureStatistics {
 /// Count, range, mean and sum of squared deviations of some rows, by dimension.
 #[derive(Clone, Debug)]
 struct Moments {
+    /// Rows.
     count: u64,
+    /// How many of them have a finite number, by dimension. The rest is of these.
+    finite: Vec<u64>,
     min: Vec<f64>,
     max: Vec<f64>,
     mean: Vec<f64>,
@@ -61,13 +66,15 @@ struct Moments {
 impl Moments {
     fn new(width: usize) -> Self {
         let zeros = vec![0.0; width];
-        Self { count: 0, min: zeros.clone(), max: zeros.clone(), mean: zeros.clone(), squares: zeros }
+        let finite = vec![0; width];
+        Self { count: 0, finite, min: zeros.clone(), max: zeros.clone(), mean: zeros.clone(), squares: zeros }
     }
 
     /// Takes those of some rows, given one after another.
     fn measure(&mut self, values: &[f64]) {
         let width = self.mean.len();
         self.count = (values.len() / width) as u64;
+        self.finite.fill(self.count);
         self.min.fill(f64::INFINITY);
         self.max.fill(f64::NEG_INFINITY);
         self.mean.fill(0.0);
@@ -80,6 +87,10 @@ impl Moments {
                 *sum += value;
             }
         }
+        // A sum with a number that is none is none.
+        if self.mean.iter().any(|sum| !sum.is_finite()) {
+            return (0..width).for_each(|at| self.measure_finite(at, values));
+        }
         self.mean.iter_mut().for_each(|mean| *mean /= self.count as f64);
         for row in values.chunks_exact(width) {
             for ((squares, mean), value) in self.squares.iter_mut().zip(&self.mean).zip(row) {
@@ -88,26 +99,40 @@ impl Moments {
         }
     }
 
+    /// Takes those of the finite numbers of a dimension; of none at all they are NaN.
+    fn measure_finite(&mut self, at: usize, values: &[f64]) {
+        let finite = || values.iter().skip(at).step_by(self.mean.len()).copied().filter(|value| value.is_finite());
+        let n = finite().count();
+        let mean = finite().sum::<f64>() / n as f64;
+        let squares = finite().map(|value| (value - mean) * (value - mean)).sum();
+        let [min, max] = [f64::min, f64::max].map(|of| finite().reduce(of).unwrap_or(f64::NAN));
+        self.finite[at] = n as u64;
+        (self.min[at], self.max[at], self.mean[at], self.squares[at]) = (min, max, mean, squares);
+    }
+
     /// Chan's pairwise update.
     fn merge(&mut self, other: &Self) {
-        if self.count == 0 {
-            self.clone_from(other);
-            return;
-        }
-        let count = self.count + other.count;
-        let share = other.count as f64 / count as f64;
         for at in 0..self.mean.len() {
-            let delta = other.mean[at] - self.mean[at];
-            self.squares[at] += other.squares[at] + delta * delta * self.count as f64 * share;
-            self.mean[at] += delta * share;
-            self.min[at] = self.min[at].min(other.min[at]);
-            self.max[at] = self.max[at].max(other.max[at]);
+            let (own, others) = (self.finite[at], other.finite[at]);
+            let count = own + others;
+            if others > 0 && own == 0 {
+                (self.min[at], self.max[at]) = (other.min[at], other.max[at]);
+                (self.mean[at], self.squares[at]) = (other.mean[at], other.squares[at]);
+            } else if others > 0 {
+                let share = others as f64 / count as f64;
+                let delta = other.mean[at] - self.mean[at];
+                self.squares[at] += other.squares[at] + delta * delta * own as f64 * share;
+                self.mean[at] += delta * share;
+                self.min[at] = self.min[at].min(other.min[at]);
+                self.max[at] = self.max[at].max(other.max[at]);
+            }
+            self.finite[at] = count;
         }
-        self.count = count;
+        self.count += other.count;
     }
 
     fn std(&self) -> impl Iterator<Item = f64> {
-        self.squares.iter().map(|squares| (squares / self.count as f64).sqrt())
+        self.squares.iter().zip(&self.finite).map(|(squares, &n)| (squares / n as f64).sqrt())
     }
 }
 
@@ -208,11 +233,12 @@ impl Statistics {
         }
     }
 
-    /// Statistics of the whole dataset, by feature.
+    /// Statistics of the whole dataset, by feature. One with a dimension that has no finite number has none.
     pub(crate) fn finish(self) -> Result<Vec<(String, FeatureStatistics)>, IoError> {
         let mut selectors: Vec<Vec<Selector>> = self.features.iter().map(Gathered::selectors).collect();
         self.spool.select(&mut selectors)?;
-        let pairs = self.features.iter().zip(&selectors);
+        let is_whole = |(of, _): &(&Gathered, &Vec<Selector>)| of.whole.finite.iter().all(|&n| n > 0);
+        let pairs = self.features.iter().zip(&selectors).filter(is_whole);
         Ok(pairs.map(|(of, selectors)| (of.feature.name.clone(), of.whole_statistics(selectors))).collect())
     }
 }
@@ -251,10 +277,12 @@ impl Gathered {
     }
 
     fn selectors(&self) -> Vec<Selector> {
-        let dtype = self.feature.dtype;
-        let ends = self.whole.min.iter().zip(&self.whole.max);
-        let keys = ends.map(|(&min, &max)| (key_of(dtype, min), key_of(dtype, max)));
-        keys.map(|keys| Selector::new(dtype, keys, self.whole.count, &QUANTILES)).collect()
+        let (dtype, whole) = (self.feature.dtype, &self.whole);
+        let selector = |at: usize| {
+            let ends = (key_of(dtype, whole.min[at]), key_of(dtype, whole.max[at]));
+            Selector::new(dtype, ends, (whole.finite[at], whole.count), &QUANTILES)
+        };
+        (0..self.feature.width).map(selector).collect()
     }
 
     fn whole_statistics(&self, selectors: &[Selector]) -> FeatureStatistics {

@@ -445,3 +445,36 @@ fn validate_finds_a_changed_byte_in_plan_and_receipts() {
         "plan_id and shard",
     );
 }
+
+/// The same table with its columns in the order from the last to the first.
+fn turn_columns(path: &Path) {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(path).unwrap()).unwrap();
+    let batches: Vec<RecordBatch> = builder.build().unwrap().map(Result::unwrap).collect();
+    let n_columns = batches[0].num_columns();
+    let turned: Vec<usize> = (0..n_columns).rev().collect();
+    let batches: Vec<RecordBatch> = batches.iter().map(|rows| rows.project(&turned).unwrap()).collect();
+    let file = std::fs::File::create(path).unwrap();
+    let mut writer = ArrowWriter::try_new(file, batches[0].schema(), None).unwrap();
+    batches.iter().for_each(|rows| writer.write(rows).unwrap());
+    writer.close().unwrap();
+}
+
+#[test]
+fn the_order_of_columns_is_no_difference() {
+    let folder = two_datasets();
+    let [a, _] = sources(folder.path());
+    let turned = folder.path().join("turned");
+    crate::smoke::copy_folder(&a, &turned);
+    for table in ["data/chunk-000/file-000.parquet", "ntp/calls/chunk-000/file-000.parquet", "ntp/episodes.parquet"] {
+        turn_columns(&turned.join(table));
+    }
+    let found = diff(&a, &turned).unwrap();
+    assert!(found.is_none() && found.same == 4, "{found:?}");
+    rewrite(&turned, "data/chunk-000/file-000.parquet", &schema::FRAMES, |columns| {
+        let (_, column) = columns.iter_mut().find(|(name, _)| name == "ntp.call_id").unwrap();
+        let Column::Int64(calls) = column else { panic!("{column:?}") };
+        calls[0] += 1;
+    });
+    let found = diff(&a, &turned).unwrap();
+    assert_eq!((found.changed, found.changed_episodes[0].frames["ntp.call_id"]), (1, 1), "{found:?}");
+}

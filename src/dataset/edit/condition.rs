@@ -53,6 +53,19 @@ pub struct EpisodeRange {
     last: u64,
 }
 
+impl EpisodeRange {
+    /// The numbers of the episodes.
+    pub fn numbers(self) -> std::ops::RangeInclusive<u64> {
+        self.first..=self.last
+    }
+}
+
+impl From<u64> for EpisodeRange {
+    fn from(episode: u64) -> Self {
+        Self { first: episode, last: episode }
+    }
+}
+
 impl std::str::FromStr for EpisodeRange {
     type Err = String;
 
@@ -121,10 +134,7 @@ impl Condition {
         any(self.tasks.is_empty(), self.tasks.iter().any(is_task))
             && any(self.families.is_empty(), self.families.iter().any(|family| family.name() == of.family))
             && any(self.outcomes.is_empty(), self.outcomes.iter().any(|ending| ending.fits(of.cause)))
-            && any(
-                self.episodes.is_empty(),
-                self.episodes.iter().any(|range| (range.first..=range.last).contains(&of.index)),
-            )
+            && any(self.episodes.is_empty(), self.episodes.iter().any(|range| range.numbers().contains(&of.index)))
             && self.split.as_ref().is_none_or(|split| split == of.split)
             && self.min_frames.is_none_or(|least| of.n_frames >= least)
             && self.max_frames.is_none_or(|most| of.n_frames <= most)

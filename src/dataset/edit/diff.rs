@@ -203,7 +203,21 @@ fn plain_settings(before: &Contents, after: &Contents) -> Vec<String> {
         ]
     };
     let pairs = of(before).into_iter().zip(of(after));
-    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).collect()
+    let named = |contents: &Contents| -> BTreeMap<String, String> {
+        let features = contents.source.info.features.iter();
+        features.map(|feature| (feature.name.clone(), feature.json["names"].to_string())).collect()
+    };
+    let names = other_names(&named(before), &named(after));
+    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).chain(names).collect()
+}
+
+/// Features of both whose values have other names, or the same in another order.
+fn other_names(before: &BTreeMap<String, String>, after: &BTreeMap<String, String>) -> Vec<String> {
+    let other = |(feature, a): (&String, &String)| {
+        let b = after.get(feature).filter(|b| *b != a)?;
+        Some(format!("names of {feature}: {a} → {b}"))
+    };
+    before.iter().filter_map(other).collect()
 }
 
 fn other_settings(before: &Source, after: &Source) -> Vec<String> {
@@ -221,5 +235,10 @@ fn other_settings(before: &Source, after: &Source) -> Vec<String> {
         ]
     };
     let pairs = of(before).into_iter().zip(of(after));
-    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).collect()
+    let named = |source: &Source| -> BTreeMap<String, String> {
+        let features = source.info.features.0.iter();
+        features.map(|(name, of)| (name.clone(), format!("{:?}", of.names.as_deref().unwrap_or_default()))).collect()
+    };
+    let names = other_names(&named(before), &named(after));
+    pairs.filter(|(a, b)| a != b).map(|((name, a), (_, b))| format!("{name}: {a} → {b}")).chain(names).collect()
 }

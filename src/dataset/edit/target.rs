@@ -70,6 +70,9 @@ pub struct EditSummary {
     pub failed: u64,
     /// Episodes of the sources that are not in it.
     pub left_out: u64,
+    /// Features without statistics: nothing finite is in one of their dimensions, or their sources state none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without_statistics: Vec<String>,
     /// Every file, relative to the dataset with `/`, in order of their names.
     #[serde(skip)]
     pub files: Vec<String>,

@@ -15,6 +15,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::files::stated::read_statistics;
 use crate::dataset::plain::{ProgramTables, program_tables};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::dataset::tables::frames::feature::action_of;
@@ -43,7 +44,7 @@ pub(super) fn write_frames(
     copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots, action_of(&info)), change)?;
     copy_folder(&root.join(layout::VIDEOS), &to.join(layout::VIDEOS))?;
     write_info(root, to, &info, further)?;
-    let mut stats: BTreeMap<String, Value> = read_json(&root.join(layout::STATS))?;
+    let mut stats: BTreeMap<String, Value> = read_statistics(&root.join(layout::STATS))?.into_iter().collect();
     stats.retain(|name, _| !is_ours(name));
     write_json(&to.join(layout::STATS), &stats)?;
     for file in [layout::TASKS, layout::SUBTASKS] {

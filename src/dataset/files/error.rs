@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::artifact::IoError;
 use crate::table::TableError;
 use crate::video::VideoError;
+use crate::words::counted;
 
 /// A dataset that could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +32,7 @@ pub enum ConvertError {
         failed: u64,
     },
     /// A dataset has one width of observation.
-    #[error("episode {episode} has {found} slots, but the episodes before it have {expected}")]
+    #[error("episode {episode} has {found}, but the episodes before it have {expected}", found = counted(*found, "slot"))]
     Slots {
         /// The episode's number in its recordings.
         episode: u64,

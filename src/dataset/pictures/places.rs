@@ -7,6 +7,7 @@ use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::pictures::video_columns;
 use crate::dataset::schema::META_EPISODES;
 use crate::table::{self, Columns};
+use crate::words::counted;
 
 /// Where the pictures of an episode are.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +38,8 @@ pub(super) fn places(
             image_places(columns, &lengths)?
         };
         if of_file.is_empty() {
-            let problem = format!("it ends after {} of {n_episodes} episodes", places.len());
+            let problem =
+                format!("it ends after {} of {n_episodes}", places.len(), n_episodes = counted(n_episodes, "episode"));
             return Err(DatasetError::Count { path, problem });
         }
         places.extend(of_file);

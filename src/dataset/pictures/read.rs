@@ -13,6 +13,7 @@ use crate::dataset::pictures::places::{Place, places};
 use crate::dataset::schema::FRAMES;
 use crate::table::{PictureReader, TableError};
 use crate::video::{Mp4Pictures, Mp4Reader, Rgb, VideoError, decode_png};
+use crate::words::counted;
 
 /// The pictures of one camera of a dataset, any episode in any order. Memory holds where each episode is, and the
 /// footers of the files that were read last.
@@ -180,10 +181,10 @@ impl EpisodePictures {
             Files::Videos(_) => self.root.join(file.video(&self.feature)),
         };
         let problem = match place {
-            None => format!("there are {n_episodes} episodes"),
+            None => format!("there are {n_episodes}", n_episodes = counted(n_episodes, "episode")),
             Some(place) => match rows.iter().find(|&&row| row as usize >= place.count) {
                 None => return Ok((*place, path)),
-                Some(row) => format!("row {row} has no picture, there are {} rows", place.count),
+                Some(row) => format!("row {row} has no picture, there are {}", counted(place.count, "row")),
             },
         };
         let problem = format!("{}: {problem}", self.feature);

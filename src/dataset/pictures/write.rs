@@ -13,6 +13,7 @@ use crate::recording::CameraPictures;
 use crate::render::PictureFormat;
 use crate::table::{ColumnKind, Value, Values};
 use crate::video::VideoError;
+use crate::words::counted;
 
 /// Bytes of pictures that make a row group, at least.
 const GROUP_BYTES: usize = 1 << 25;
@@ -97,7 +98,7 @@ impl PictureFeatures {
         let wrong =
             |camera: &str, problem: String| ConvertError::Pictures { episode, camera: camera.to_owned(), problem };
         if cameras.len() != self.features.len() {
-            let problem = format!("there are {} cameras, but before {}", cameras.len(), self.features.len());
+            let problem = format!("there are {}, but before {}", counted(cameras.len(), "camera"), self.features.len());
             return Err(wrong("", problem));
         }
         for (feature, pictures) in self.features.iter_mut().zip(cameras) {
@@ -189,7 +190,11 @@ fn rows<'p>(view: &EpisodeView<'_>, pictures: &'p CameraPictures) -> Result<Vec<
         return Ok(pictures.pictures.iter().collect());
     }
     if n_pictures != n_frames {
-        return Err(format!("it has {n_pictures} pictures of {n_frames} frames"));
+        return Err(format!(
+            "it has {n_pictures} of {n_frames}",
+            n_pictures = counted(n_pictures, "picture"),
+            n_frames = counted(n_frames, "frame")
+        ));
     }
     let frames = view.episode.frames.iter().zip(&pictures.pictures);
     Ok(frames.filter(|(frame, _)| frame.boundary).map(|(_, picture)| picture).collect())

@@ -6,6 +6,7 @@ use arrow::array::RecordBatch;
 
 use crate::dataset::DatasetError;
 use crate::table::BatchReader;
+use crate::words::counted;
 
 /// Rows that are read at a time; fewer where a row may hold a picture.
 const BATCH_ROWS: usize = 4096;
@@ -67,7 +68,7 @@ impl RowCursor {
                 None => open.reader.next_batch().map_err(DatasetError::from)?,
             };
             let Some(batch) = batch else {
-                let problem = format!("it ends {n_left} rows before the end of an episode");
+                let problem = format!("it ends {n_left} before the end of an episode", n_left = counted(n_left, "row"));
                 return Err(DatasetError::Count { path: path.to_owned(), problem }.into());
             };
             let n = n_left.min(batch.num_rows());

@@ -12,6 +12,7 @@ use crate::dataset::plain::episode::{PlainEpisode, read_episodes};
 use crate::dataset::plain::listing::parquet_files;
 use crate::dataset::plain::texts::{PlainTexts, read_subtasks, read_tasks};
 use crate::table::BatchReader;
+use crate::words::counted;
 
 /// Whose program tables a dataset has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +114,8 @@ impl PlainSource {
         if let Some(path) = self.data_files.get(at) {
             BatchReader::open_columns(path, 1, |_name| false)?;
         }
-        let problem = format!("the files have {before} rows, but an episode begins at row {first}");
+        let problem =
+            format!("the files have {before}, but an episode begins at row {first}", before = counted(before, "row"));
         Err(DatasetError::Count { path: self.info.root().join(layout::DATA), problem })
     }
 

@@ -11,6 +11,7 @@ use crate::dataset::tables::frames::feature::POSITION_NAMES;
 use crate::dataset::tables::{frames, meta_episodes};
 use crate::table::batch;
 use crate::trace::{Observation, ObservationRows};
+use crate::words::counted;
 
 /// The feature that holds observations.
 const STATE: &str = "observation.state";
@@ -158,7 +159,7 @@ impl ObservedEpisodes {
                 return Err(self.frames.problem(format!("{names} are {found:?}, but should be {expected:?}")));
             }
             if state.len() != width || !state.iter().all(|value| value.is_finite()) {
-                let problem = format!("{STATE} is {} numbers, or not finite; expected {width}", state.len());
+                let problem = format!("{STATE} is {}, or not finite; expected {width}", counted(state.len(), "number"));
                 return Err(self.frames.problem(problem));
             }
             values.extend_from_slice(state);

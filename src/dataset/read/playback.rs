@@ -21,6 +21,7 @@ use crate::dataset::statistics::copy_values;
 use crate::dataset::tables::annotated::ROOT;
 use crate::dataset::{CallFacts, DatasetError, EpisodeFacts, EpisodePictures};
 use crate::table::{BatchReader, TableError};
+use crate::words::counted;
 
 /// Numbers of rows and labels, which calls and times show already.
 const BOOKKEEPING: [&str; 6] = ["timestamp", "frame_index", "episode_index", "index", "task_index", "subtask_index"];
@@ -221,7 +222,11 @@ impl Frames {
         if rows.num_rows() == n_rows {
             return Ok(Self { path, rows });
         }
-        let problem = format!("it ends after {} of the {n_rows} frames of an episode", rows.num_rows());
+        let problem = format!(
+            "it ends after {} of the {n_rows} of an episode",
+            rows.num_rows(),
+            n_rows = counted(n_rows, "frame")
+        );
         Err(DatasetError::Count { path, problem })
     }
 

@@ -10,6 +10,7 @@ use crate::dataset::files::pointer::pointer_problem;
 use crate::dataset::plain::{EPISODE_LINES, PlainSource, has_programs};
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, SCOPES, SUBTASKS, TASKS};
 use crate::table::{Column, TableReader, TableSchema};
+use crate::words::counted;
 
 /// Where the rows of a table are.
 #[derive(Clone, Debug)]
@@ -96,7 +97,11 @@ fn files_of(root: &Path, schema: &TableSchema, folder: &str, expected: u64) -> R
         place = place.next();
     }
     if n_rows != expected {
-        let problem = format!("its {} files have {n_rows} rows, but the dataset counts {expected}", files.len());
+        let problem = format!(
+            "its {} have {n_rows}, but the dataset counts {expected}",
+            counted(files.len(), "file"),
+            n_rows = counted(n_rows, "row")
+        );
         return Err(DatasetError::Count { path: root.join(folder), problem });
     }
     Ok(files)

@@ -13,6 +13,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::export::language;
 use crate::dataset::files::info::{BY_MODEL, Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
+use crate::dataset::files::stated::read_statistics;
 use crate::dataset::relabel::RelabelSummary;
 use crate::dataset::relabel::columns::with_columns;
 use crate::dataset::relabel::tables::{EpisodeNames, Written};
@@ -23,6 +24,7 @@ use crate::dataset::tables::frames::feature::FEATURES;
 use crate::dataset::tables::texts::write::write_subtasks;
 use crate::program::KnownPrograms;
 use crate::table::{BatchReader, BatchWriter, Values, WriteOptions};
+use crate::words::counted;
 
 /// Rows that are read at a time.
 const BATCH_ROWS: usize = 4096;
@@ -105,7 +107,11 @@ fn write_episodes(root: &Path, to: &Path, episodes: &[EpisodeNames], statistics:
         place = place.next();
     }
     if begin < episodes.len() {
-        let problem = format!("it has {begin} rows, but there are {} episodes", episodes.len());
+        let problem = format!(
+            "it has {begin}, but there are {}",
+            counted(episodes.len(), "episode"),
+            begin = counted(begin, "row")
+        );
         return Err(EditError::refused("import.rows", &root.join(layout::META_EPISODES), problem));
     }
     Ok(())
@@ -160,7 +166,7 @@ fn list_field(name: &str, values: Values<'_>) -> Field {
 
 fn write_statistics(root: &Path, to: &Path, statistics: Statistics) -> Result<(), EditError> {
     let path = root.join(layout::STATS);
-    let mut all: Map<String, Value> = if path.is_file() { read_json(&path)? } else { Map::new() };
+    let mut all: Map<String, Value> = if path.is_file() { read_statistics(&path)? } else { Map::new() };
     for (name, statistics) in statistics.finish()? {
         all.insert(name, json!(statistics));
     }

@@ -47,6 +47,9 @@ struct Wanted {
 pub(super) struct Selector {
     dtype: Dtype,
     min_key: u64,
+    max_key: u64,
+    /// Whether keys come that are not to be counted: they lie outside of the ends.
+    has_others: bool,
     n_digits: u32,
     digits_left: u32,
     places: Vec<Place>,
@@ -58,8 +61,10 @@ pub(super) struct Selector {
 }
 
 impl Selector {
-    /// A selector among `count` keys from `min_key` to `max_key`.
-    pub(super) fn new(dtype: Dtype, (min_key, max_key): (u64, u64), count: u64, shares: &[f64]) -> Self {
+    /// A selector among `count` keys from `min_key` to `max_key`; those that come are so many in `all`.
+    pub(super) fn new(dtype: Dtype, (min_key, max_key): (u64, u64), (count, all): (u64, u64), shares: &[f64]) -> Self {
+        // Among no keys there is nothing to select.
+        let (min_key, max_key) = if count == 0 { (0, 0) } else { (min_key, max_key) };
         let bits = u64::BITS - (max_key - min_key).leading_zeros();
         let places: Vec<Place> = shares.iter().map(|&share| Place::new(share, count)).collect();
         let mut ranks: Vec<u64> = places.iter().flat_map(|place| [place.below, place.above]).collect();
@@ -68,8 +73,18 @@ impl Selector {
         let wanted = ranks.into_iter().map(|rank| Wanted { rank, prefix: 0, n_smaller: 0 }).collect();
         let n_digits = bits.div_ceil(DIGIT_BITS);
         let (counts, may_begin_with) = (Vec::new(), Box::new([true; N_DIGITS]));
-        let mut selector =
-            Self { dtype, min_key, n_digits, digits_left: n_digits, places, wanted, counts, may_begin_with };
+        let mut selector = Self {
+            dtype,
+            min_key,
+            max_key,
+            has_others: count < all,
+            n_digits,
+            digits_left: n_digits,
+            places,
+            wanted,
+            counts,
+            may_begin_with,
+        };
         selector.begin_pass();
         selector
     }
@@ -96,6 +111,16 @@ impl Selector {
 
     /// Counts some keys.
     pub(super) fn count(&mut self, keys: &[u64]) {
+        if self.has_others {
+            let ends = self.min_key..=self.max_key;
+            let own: Vec<u64> = keys.iter().copied().filter(|key| ends.contains(key)).collect();
+            self.count_own(&own);
+        } else {
+            self.count_own(keys);
+        }
+    }
+
+    fn count_own(&mut self, keys: &[u64]) {
         let first_shift = DIGIT_BITS * (self.n_digits - 1);
         let shift = DIGIT_BITS * (self.digits_left - 1);
         let digit = |number: u64, shift: u32| (number >> shift) as usize % N_DIGITS;
@@ -156,7 +181,7 @@ mod tests {
     fn selected(dtype: Dtype, values: &[f64]) -> Vec<f64> {
         let keys: Vec<u64> = values.iter().map(|&value| key_of(dtype, value)).collect();
         let ends = (*keys.iter().min().unwrap(), *keys.iter().max().unwrap());
-        let mut selector = Selector::new(dtype, ends, keys.len() as u64, &SHARES);
+        let mut selector = Selector::new(dtype, ends, (keys.len() as u64, keys.len() as u64), &SHARES);
         while !selector.is_done() {
             keys.chunks(7).for_each(|keys| selector.count(keys));
             selector.end_pass();
@@ -199,6 +224,19 @@ mod tests {
                 prop_assert_eq!(value_of(Dtype::Float32, key_a), f64::from(a));
             }
         }
+    }
+
+    #[test]
+    fn keys_beside_the_ends_are_not_counted() {
+        let keys: Vec<u64> =
+            [4.0, f64::NAN, 1.0, -f64::NAN, 3.0, f64::INFINITY, 2.0].map(|value| key_of(Dtype::Float32, value)).into();
+        let ends = (key_of(Dtype::Float32, 1.0), key_of(Dtype::Float32, 4.0));
+        let mut selector = Selector::new(Dtype::Float32, ends, (4, 7), &SHARES);
+        while !selector.is_done() {
+            selector.count(&keys);
+            selector.end_pass();
+        }
+        assert_eq!([0, 1, 2, 3].map(|position| selector.quantile(position)), [1.0, 1.3, 2.5, 4.0]);
     }
 
     #[test]

@@ -16,6 +16,7 @@ use crate::dataset::tables::frames::feature::{FEATURES, Feature, known};
 use crate::dataset::tables::texts::read::{Texts, read_all_texts};
 use crate::program::KnownPrograms;
 use crate::table::{Columns, TableError, TableReader};
+use crate::words::counted;
 
 /// Checks the files below `meta/` and `ntp/info.json`.
 pub(super) fn check(root: &Path, validation: &mut Validation) -> Texts {
@@ -60,7 +61,7 @@ fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validati
     if info.total_tasks != texts.tasks.len() as u64 {
         error(
             "total_tasks",
-            format!("it is {}, but {} has {} rows", info.total_tasks, layout::TASKS, texts.tasks.len()),
+            format!("it is {}, but {} has {}", info.total_tasks, layout::TASKS, counted(texts.tasks.len(), "row")),
         );
     }
     let declared: BTreeMap<_, _> = info.features.0.iter().map(|(name, feature)| (name.as_str(), feature)).collect();
@@ -175,7 +176,14 @@ fn episode_statistics_problems(
     let mut problems = Vec::new();
     for (row, &length) in lengths.iter().enumerate() {
         if count.row(row) != [length] {
-            problems.push((row, format!("count is {:?}, but the episode has {length} frames", count.row(row))));
+            problems.push((
+                row,
+                format!(
+                    "count is {:?}, but the episode has {length}",
+                    count.row(row),
+                    length = counted(length, "frame")
+                ),
+            ));
         }
         let (min, mean, max, std) = (min.row(row), mean.row(row), max.row(row), std.row(row));
         let is_ordered = [mean.len(), max.len(), std.len()] == [min.len(); 3]
@@ -201,7 +209,7 @@ fn statistics_problem(statistics: &FeatureStatistics, feature: &Feature, info: &
         return Some(format!("it has {width} dimensions, but statistics of {}", list.len()));
     }
     if *count != [info.total_frames as i64] {
-        return Some(format!("count is {count:?}, but there are {} frames", info.total_frames));
+        return Some(format!("count is {count:?}, but there are {}", counted(info.total_frames, "frame")));
     }
     let in_order = |at: usize| lists[..7].windows(2).all(|pair| pair[0][at] <= pair[1][at]) && std[at] >= 0.0;
     (0..width)

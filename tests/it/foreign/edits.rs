@@ -1,7 +1,10 @@
 //! Datasets made of datasets of others: rows, packets, splits and statistics are carried over, and nothing is decoded.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use arrow::array::{FixedSizeListArray, Float32Array};
+use arrow::datatypes::{DataType, Field};
 use ntp::dataset::edit::{Carry, Condition, EditError, SplitBy, Unit, diff, filter, merge, repair, split};
 use ntp::dataset::{Severity, play_back, summarize, validate};
 use ntp::publish::{Folder, Publication, publish};
@@ -256,4 +259,57 @@ fn a_dataset_of_others_is_published_with_nothing_claimed_of_it() {
     }
     assert_eq!(summarize(&to).unwrap().total_frames, 15);
     is_whole(&to);
+}
+
+/// Rows of the action's second value that are no numbers: 3 and 4 of the first episode.
+fn with_no_numbers(mini: &mut Mini) {
+    let actions = (0..15).flat_map(|row| {
+        let second = match row {
+            3 => f32::NAN,
+            4 => f32::NEG_INFINITY,
+            row => row as f32,
+        };
+        [0.5, second]
+    });
+    let values = Float32Array::from_iter_values(actions);
+    let item = Arc::new(Field::new("element", DataType::Float32, false));
+    mini.replace("action", Arc::new(FixedSizeListArray::new(item, 2, Arc::new(values), None)));
+    let nothing = || Arc::new(Float32Array::from(vec![f32::NAN; 15]));
+    mini.column("touch", crate::foreign::one("float32"), nothing());
+}
+
+#[test]
+fn numbers_that_are_none_are_left_out_of_statistics() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = made(folder.path(), "theirs", with_no_numbers);
+    // As Python writes them.
+    let text = stats(&root).to_string().replacen("\"max\":[0.5,14.0]", "\"max\":[0.5,NaN]", 1);
+    assert!(text.contains("NaN"), "{text}");
+    std::fs::write(root.join("meta/stats.json"), text).unwrap();
+    let to = folder.path().join("chosen");
+    let condition = Condition { episodes: vec!["0".parse().unwrap()], ..Condition::default() };
+    let summary = filter(&root, &condition, &to, Carry::Packets).unwrap();
+    let of = &stats(&to)["action"];
+    // 0, 1, 2 and 5: their mean is 2, their deviation the root of (4 + 1 + 0 + 9) / 4, half is at 1.5.
+    assert_eq!((&of["min"], &of["max"], &of["mean"]), (&json!([0.5, 0.0]), &json!([0.5, 5.0]), &json!([0.5, 2.0])));
+    assert_eq!((&of["q50"], &of["count"]), (&json!([0.5, 1.5]), &json!([6])));
+    assert!((of["std"][1].as_f64().unwrap() - 3.5_f64.sqrt()).abs() < 1e-12, "{of}");
+    assert_eq!((summary.without_statistics, stats(&to).get("touch")), (vec!["touch".to_owned()], None));
+    assert!(!std::fs::read_to_string(to.join("meta/stats.json")).unwrap().contains("null"));
+    let both = folder.path().join("both");
+    merge(&[root.clone(), to], &both, Carry::Packets).unwrap();
+    assert_eq!(stats(&both)["action"]["max"], json!([0.5, 14.0]));
+    let parts = split(&root, &SplitBy::Task, &folder.path().join("parts"), Carry::Packets).unwrap();
+    for (name, part) in parts {
+        assert_eq!(part.without_statistics, ["touch"], "{name}");
+    }
+}
+
+#[test]
+fn values_with_other_names_are_a_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = made(folder.path(), "a", |_| {});
+    let b = made(folder.path(), "b", |mini| mini.info["features"]["action"]["names"] = json!(["y", "x"]));
+    let found = diff(&a, &b).unwrap();
+    assert_eq!((found.same, found.settings), (3, vec!["names of action: [\"x\",\"y\"] → [\"y\",\"x\"]".to_owned()]));
 }

@@ -46,7 +46,9 @@ pub(super) fn digests(root: &Path) -> Result<Vec<EpisodeDigest>, EditError> {
     let mut digests = Vec::new();
     while let Some(episode) = source.next_episode()? {
         let failed = EditError::rows(source.root().join(layout::EPISODES));
-        let videos = videos.iter_mut().map(|video| video.column(&episode, &source)).collect::<Result<Vec<_>, _>>()?;
+        let mut videos =
+            videos.iter_mut().map(|video| video.column(&episode, &source)).collect::<Result<Vec<_>, _>>()?;
+        videos.sort_by(|(a, _), (b, _)| a.cmp(b));
         let content = content(&episode, &source.subtasks, &videos).map_err(failed)?;
         digests.push(EpisodeDigest { identity: identity(&episode.row), content });
     }
@@ -90,8 +92,8 @@ fn hash_rows(columns: &[(String, ArrayRef)], hasher: &mut DefaultHasher) -> Resu
     Ok(())
 }
 
-/// The columns that are the same wherever the rows lie; sub-tasks are given by their texts, lists of a fixed length as
-/// lists.
+/// The columns that are the same wherever the rows lie, in the order of their names; sub-tasks are given by their texts,
+/// lists of a fixed length as lists.
 pub(super) fn comparable(rows: &RecordBatch, subtasks: &[String]) -> Result<Vec<(String, ArrayRef)>, ArrowError> {
     let mut columns = Vec::new();
     for (field, column) in rows.schema().fields().iter().zip(rows.columns()) {
@@ -109,5 +111,6 @@ pub(super) fn comparable(rows: &RecordBatch, subtasks: &[String]) -> Result<Vec<
         let texts: StringArray = column.values().iter().map(text).collect();
         columns.push(("subtask".to_owned(), Arc::new(texts)));
     }
+    columns.sort_by(|(a, _), (b, _)| a.cmp(b));
     Ok(columns)
 }

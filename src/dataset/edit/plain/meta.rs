@@ -16,6 +16,7 @@ use crate::dataset::edit::EditError;
 use crate::dataset::edit::plain::json::array_of;
 use crate::dataset::edit::plain::schema::{cast_to, fitted, plain_type};
 use crate::dataset::files::layout;
+use crate::dataset::files::stated::parse;
 use crate::dataset::pictures::video_columns;
 use crate::dataset::plain::{DeclaredKind, PlainEpisode, PlainInfo, PlainSource, RowCursor};
 use crate::table::BatchReader;
@@ -99,7 +100,7 @@ fn line(
         let line = line.map_err(IoError::system("read", &path))?;
         *next += 1;
         if *next == position + 1 {
-            let value: Value = serde_json::from_str(&line).map_err(|error| wrong(format!("no JSON: {error}")))?;
+            let value: Value = parse(&line).map_err(|error| wrong(format!("no JSON: {error}")))?;
             return Ok(value["stats"].clone());
         }
     }

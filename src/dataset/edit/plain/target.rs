@@ -10,7 +10,7 @@ use arrow::compute::concat_batches;
 use arrow::datatypes::SchemaRef;
 use serde_json::{Map, Value, json};
 
-use crate::artifact::{read_json, write_json};
+use crate::artifact::write_json;
 use crate::dataset::DatasetError;
 use crate::dataset::edit::plain::exact::{Counted, statistic_of_row};
 use crate::dataset::edit::plain::json::shaped;
@@ -23,12 +23,14 @@ use crate::dataset::edit::{EditError, EditSummary};
 use crate::dataset::files::info::{Dtype, LEROBOT_VERSION, Stats};
 use crate::dataset::files::layout::{self, CHUNK_FILES};
 use crate::dataset::files::rolling::Rolling;
+use crate::dataset::files::stated::{is_of_numbers, read_statistics};
 use crate::dataset::plain::{Declared, DeclaredKind, FlatNumbers, PlainSource, RowCursor, whole_numbers};
 use crate::dataset::schema::{FRAMES, META_EPISODES};
 use crate::dataset::statistics::{FeatureStatistics, NumericFeature, Statistics};
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
 use crate::dataset::write::sheaf::MEGABYTE;
 use crate::table::{BatchReader, BatchWriter, TextTable, WriteOptions};
+use crate::words::counted;
 
 /// Rows of an episode become a row group at its end, or when they are this large.
 const GROUP_BYTES: usize = 24 * MEGABYTE;
@@ -76,8 +78,6 @@ pub(in crate::dataset::edit) struct PlainTarget {
     features: Vec<Declared>,
     numeric: Vec<NumericFeature>,
     statistics: Statistics,
-    /// Features with a value that is no finite number: they have no statistics.
-    not_finite: Vec<String>,
     pictures: BTreeMap<String, PictureSums>,
     tasks: TextTable,
     subtasks: TextTable,
@@ -125,7 +125,6 @@ impl PlainTarget {
             features: info.features.clone(),
             statistics: Statistics::new(root, numeric.clone()),
             numeric,
-            not_finite: Vec::new(),
             pictures: pictures
                 .map(|of| (of.name.clone(), PictureSums::new(if is_picture(&of) { 3 } else { 1 })))
                 .collect(),
@@ -299,7 +298,8 @@ impl PlainTarget {
         let mut new_tasks = Vec::with_capacity(n_rows);
         for task in tasks {
             let text = source.tasks.get(task).ok_or_else(|| {
-                let problem = format!("task_index is {task}, but there are {} tasks", source.tasks.rows.len());
+                let problem =
+                    format!("task_index is {task}, but there are {}", counted(source.tasks.rows.len(), "task"));
                 EditError::refused("edit.columns", path, problem)
             })?;
             new_tasks.push(i64::from(self.tasks.key(text)));
@@ -349,9 +349,6 @@ impl PlainTarget {
             };
             let column = rows.column_by_name(&feature.name).ok_or_else(wrong)?;
             let numbers = FlatNumbers::of(column, feature.dtype, feature.width).map_err(|_problem| wrong())?;
-            if numbers.first_not_finite().is_some() && !self.not_finite.contains(&feature.name) {
-                self.not_finite.push(feature.name.clone());
-            }
             flat.push(numbers);
         }
         let columns: Vec<_> = self
@@ -379,12 +376,13 @@ impl PlainTarget {
             files.push(layout::SUBTASKS.to_owned());
         }
         write_json(&self.root.join(layout::INFO), &self.info_json())?;
-        let Self { root, statistics: numbers, pictures, not_finite, features, mut summary, .. } = self;
-        let known: Option<Value> = statistics.filter(|path| path.is_file()).map(read_json).transpose()?;
+        let Self { root, statistics: numbers, pictures, features, mut summary, .. } = self;
+        let known = statistics.filter(|path| path.is_file()).map(read_statistics).transpose()?;
+        let asked: Vec<String> =
+            self.numeric.iter().map(|feature| &feature.name).chain(pictures.keys()).cloned().collect();
         let numeric: Vec<(String, Value)> = numbers
             .finish()?
             .into_iter()
-            .filter(|(name, _)| !not_finite.contains(name))
             .map(|(name, of)| {
                 let shape = features.iter().find(|feature| feature.name == name).map(|feature| feature.shape.clone());
                 (name, statistics_json(&of, &shape.unwrap_or_default()))
@@ -393,8 +391,12 @@ impl PlainTarget {
         let of_source = |name: &str| known.as_ref()?.get(name).cloned();
         let pictures: Vec<(String, Value)> = pictures
             .into_iter()
-            .filter_map(|(name, sums)| Some((name.clone(), sums.finish().or_else(|| of_source(&name))?)))
+            .filter_map(|(name, sums)| {
+                Some((name.clone(), sums.finish().filter(is_of_numbers).or_else(|| of_source(&name))?))
+            })
             .collect();
+        let has = |name: &String| numeric.iter().chain(&pictures).any(|(known, _)| known == name);
+        summary.without_statistics = asked.into_iter().filter(|name| !has(name)).collect();
         write_json(&root.join(layout::STATS), &Stats(numeric, pictures))?;
         for table in [self.frame_files, self.meta_files] {
             files.extend(table.finish()?);

@@ -6,6 +6,7 @@ use crate::dataset::plain::labels::LabelSpan;
 use crate::dataset::plain::rows::RowCursor;
 use crate::dataset::plain::source::PlainSource;
 use crate::table::TextTable;
+use crate::words::counted;
 
 const LEVELS: [(&str, u8); 2] = [("sparse", 1), ("dense", 2)];
 
@@ -38,8 +39,8 @@ impl SarmLabels {
                     path: path.clone(),
                     row: episode.own.1 as u64,
                     problem: format!(
-                        "{name} sub-tasks have {} names, but other numbers of frames or times",
-                        names.len()
+                        "{name} sub-tasks have {}, but other numbers of frames or times",
+                        counted(names.len(), "name")
                     ),
                 })?;
                 let of_level = names.iter().zip(ends);

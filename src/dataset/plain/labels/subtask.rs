@@ -6,6 +6,7 @@ use crate::dataset::plain::labels::LabelSpan;
 use crate::dataset::plain::rows::RowCursor;
 use crate::dataset::plain::source::PlainSource;
 use crate::table::TextTable;
+use crate::words::counted;
 
 /// One past the greatest number of a sub-task without a text.
 const MAX_NUMBER: i64 = 1 << 20;
@@ -74,7 +75,7 @@ fn text_of(source: &PlainSource, number: i64, texts: &mut TextTable) -> Result<O
         None => Err(format!("subtask_index is {number}, which is none of fewer than {MAX_NUMBER} sub-tasks")),
         Some(known) => match known.get(number) {
             Some(text) => Ok(Some(texts.key(text))),
-            None => Err(format!("subtask_index is {number}, but there are {} sub-tasks", known.rows.len())),
+            None => Err(format!("subtask_index is {number}, but there are {}", counted(known.rows.len(), "sub-task"))),
         },
     }
 }

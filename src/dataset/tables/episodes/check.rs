@@ -8,6 +8,7 @@ use crate::dataset::files::layout::FilePlace;
 use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::task::{Family, Split};
 use crate::trace::Cause;
+use crate::words::counted;
 
 /// What the episodes so far said of their tasks.
 #[derive(Default)]
@@ -83,7 +84,7 @@ fn problems_of(row: &EpisodeRow, n_slots: usize) -> Vec<String> {
         problems.push(format!("specification_frames is {found}, but the episode is its own and has {expected}"));
     }
     if row.slots.len() != n_slots {
-        problems.push(format!("it names {} slots, but observations have {n_slots}", row.slots.len()));
+        problems.push(format!("it names {}, but observations have {n_slots}", counted(row.slots.len(), "slot")));
     }
     let cause = row.cause.as_deref();
     let outcome = cause.unwrap_or("success");

@@ -10,6 +10,7 @@ use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::tables::annotated::FAMILY as ANNOTATED;
 use crate::dataset::tables::{episodes, meta_episodes};
 use crate::table::{Batch as _, Columns, TableError, TableReader, TextRows, batch};
+use crate::words::counted;
 
 /// One episode's row.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +96,12 @@ impl EpisodeRows {
         let reader = Self::reader(root)?;
         if reader.n_rows() != info.total_episodes {
             let (found, expected) = (reader.n_rows(), info.total_episodes);
-            let problem = format!("it has {found} rows, but {} says {expected} episodes", layout::INFO);
+            let problem = format!(
+                "it has {found}, but {} says {expected}",
+                layout::INFO,
+                found = counted(found, "row"),
+                expected = counted(expected, "episode")
+            );
             return Err(DatasetError::Count { path: root.join(layout::EPISODES), problem });
         }
         let total = info.total_episodes;

@@ -5,6 +5,7 @@ use crate::dataset::plain::PlainSource;
 use crate::dataset::validate::plain::frames::Walk;
 use crate::dataset::validate::plain::{episodes, videos};
 use crate::table::BatchReader;
+use crate::words::counted;
 
 /// What is wrong with an episode, judged by itself; what was wrong with those before says nothing of it.
 pub(crate) fn episode_problem(source: &PlainSource, position: usize) -> Option<String> {
@@ -31,7 +32,13 @@ pub(crate) fn episode_problem(source: &PlainSource, position: usize) -> Option<S
     });
     match read {
         Ok(n_rows) if n_rows == episode.length => {}
-        Ok(n_rows) => return Some(format!("{}: it ends after {n_rows} frames of episode {position}", path.display())),
+        Ok(n_rows) => {
+            return Some(format!(
+                "{}: it ends after {n_rows} of episode {position}",
+                path.display(),
+                n_rows = counted(n_rows, "frame")
+            ));
+        }
         Err(error) => return Some(error.to_string()),
     }
     videos::check_episode(source, episode, &mut validation);

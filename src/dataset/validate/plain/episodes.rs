@@ -7,6 +7,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
 use crate::dataset::plain::{PlainEpisode, PlainSource, files_below};
+use crate::words::counted;
 
 pub(super) fn check(source: &PlainSource, validation: &mut Validation) {
     let mut next = 0;
@@ -40,7 +41,9 @@ pub(super) fn problems(source: &PlainSource, position: usize, episode: &PlainEpi
         problems.push("it has no frame".to_owned());
     }
     let unknown = episode.tasks.iter().find(|task| source.tasks.number(task).is_none());
-    problems.extend(unknown.map(|task| format!("its task {task:?} is none of the {} tasks", source.tasks.rows.len())));
+    problems.extend(
+        unknown.map(|task| format!("its task {task:?} is none of the {}", counted(source.tasks.rows.len(), "task"))),
+    );
     problems
 }
 

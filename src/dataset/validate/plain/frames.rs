@@ -14,6 +14,7 @@ use crate::dataset::validate::plain::language::check_language;
 use crate::dataset::validate::plain::ranges::Range;
 use crate::dataset::validate::plain::run::Run;
 use crate::table::BatchReader;
+use crate::words::counted;
 
 /// Rows that are read at a time; fewer where they hold pictures.
 const BATCH_ROWS: usize = 8192;
@@ -103,7 +104,7 @@ impl<'s> Walk<'s> {
         }
         let (episode, frame) = (self.episode, self.frame);
         if self.source.info.version.is_by_episode() && self.is_in_order && frame > 0 {
-            let message = format!("it ends after {frame} frames of episode {episode}");
+            let message = format!("it ends after {frame} of episode {episode}", frame = counted(frame, "frame"));
             validation.error("frames.row", path, String::new(), message);
         }
     }
@@ -189,7 +190,11 @@ impl<'s> Walk<'s> {
             }
             Err(FlatProblem::Null(row)) => return Some(("file.null", row, "it has no value".to_owned())),
             Err(FlatProblem::Width(row, found)) => {
-                return Some(("frames.shape", row, format!("it has {found} values, but its shape is {shape:?}")));
+                return Some((
+                    "frames.shape",
+                    row,
+                    format!("it has {found}, but its shape is {shape:?}", found = counted(found, "value")),
+                ));
             }
         };
         let range = self.ranges.entry(feature.name.clone()).or_insert_with(|| Range::new(width));
@@ -255,8 +260,11 @@ impl<'s> Walk<'s> {
         let ended = self.episode >= n_episodes || self.source.info.version.is_by_episode();
         if self.is_in_order && !ended {
             let path: PathBuf = self.source.info.root().join(layout::DATA);
-            let message =
-                format!("the files end after {} rows, within episode {} of {n_episodes}", self.n_rows, self.episode);
+            let message = format!(
+                "the files end after {}, within episode {} of {n_episodes}",
+                counted(self.n_rows, "row"),
+                self.episode
+            );
             validation.error("frames.row", &path, String::new(), message);
         }
         (self.ranges, self.n_rows)
@@ -307,7 +315,7 @@ impl Bookkeeping {
     fn task_problem(&self, run: &Run, source: &PlainSource) -> Option<(usize, String)> {
         let of_episode = &source.episodes[run.episode].tasks;
         first_problem(&self.task, run, |task| match source.tasks.get(task) {
-            None => Some(format!("task_index is {task}, but there are {} tasks", source.tasks.rows.len())),
+            None => Some(format!("task_index is {task}, but there are {}", counted(source.tasks.rows.len(), "task"))),
             Some(text) if !of_episode.is_empty() && !of_episode.iter().any(|of| of == text) => {
                 Some(format!("task_index {task} is {text:?}, but the tasks of the episode are {of_episode:?}"))
             }
@@ -321,7 +329,8 @@ impl Bookkeeping {
         first_problem(numbers, run, |number| {
             let is_none = number < 0 && crate::dataset::plain::has_programs(source.info.root());
             let is_known = texts.get(number).is_some() || is_none;
-            (!is_known).then(|| format!("subtask_index is {number}, but there are {} sub-tasks", texts.rows.len()))
+            (!is_known)
+                .then(|| format!("subtask_index is {number}, but there are {}", counted(texts.rows.len(), "sub-task")))
         })
     }
 }

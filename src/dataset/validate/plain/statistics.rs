@@ -9,6 +9,7 @@ use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
 use crate::dataset::plain::{Declared, DeclaredKind, PlainSource, PlainVersion, REQUIRED};
 use crate::dataset::validate::plain::ranges::Range;
+use crate::words::counted;
 
 /// How far a stated value may be from the rows', as a share of their range: floats are summed up in other orders.
 const TOLERANCE: f64 = 1e-3;
@@ -83,13 +84,17 @@ fn value_problem(of: &Value, feature: &Declared, n_rows: u64) -> Option<String> 
         match flat(of, key) {
             None => return Some(format!("{key} is missing, or not of numbers")),
             Some(numbers) if numbers.len() != width => {
-                return Some(format!("{key} has {} values, but the shape is {:?}", numbers.len(), feature.shape));
+                return Some(format!(
+                    "{key} has {}, but the shape is {:?}",
+                    counted(numbers.len(), "value"),
+                    feature.shape
+                ));
             }
             Some(_) => {}
         }
     }
     if let Some(count) = flat(of, "count").filter(|count| count.len() != 1 || count[0] != n_rows as f64) {
-        return Some(format!("count is {count:?}, but there are {n_rows} frames"));
+        return Some(format!("count is {count:?}, but there are {n_rows}", n_rows = counted(n_rows, "frame")));
     }
     let lists: Vec<(&str, Vec<f64>)> = IN_ORDER
         .into_iter()

@@ -7,6 +7,7 @@ use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout::FilePlace;
 use crate::dataset::plain::{Declared, PlainEpisode, PlainSource, VideoSpan};
 use crate::video::{Mp4Pictures, Mp4Reader, VideoTrackFile};
+use crate::words::counted;
 
 /// How far a picture's time may be from its frame's: what LeRobot allows.
 const TOLERANCE_SECS: f64 = 1e-4;
@@ -56,7 +57,7 @@ fn check_file(
     validation: &mut Validation,
 ) {
     if !path.exists() {
-        let message = format!("it is missing, but {} episodes have their pictures in it", episodes.len());
+        let message = format!("it is missing, but {} have their pictures in it", counted(episodes.len(), "episode"));
         return validation.error("pictures.place", path, String::new(), message);
     }
     let track = match VideoTrackFile::open(path) {
@@ -78,7 +79,7 @@ fn check_file(
         until = span.from_secs + episode.length as f64 / fps;
         // Half a picture, since writers round ends in their own ways.
         if let Some(to) = span.to_secs.filter(|to| (to - until).abs() > 0.5 / fps) {
-            let message = format!("to_timestamp is {to}, but {} frames end at {until}", episode.length);
+            let message = format!("to_timestamp is {to}, but {} end at {until}", counted(episode.length, "frame"));
             validation.error("pictures.place", path, place(), message);
         }
         if let Some(message) = time_problem(&track, episode, span, fps) {
