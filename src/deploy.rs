@@ -2,8 +2,8 @@
 //!
 //! # Input and output
 //!
-//! A demonstration, a policy and a robot behind a [`Session`] give [`RolloutEpisode`]s, and a folder of them: one
-//! recording, one table, with plan and manifest.
+//! A demonstration, a policy and a robot behind a [`Session`] give [`RolloutEpisode`]s, and a folder of them: a
+//! recording of each and one table, with plan and manifest.
 //!
 //! # Invariants
 //!
@@ -30,6 +30,7 @@ use crate::sim::SimulationConfig;
 use crate::table::TableError;
 use crate::task::{Family, Task, Trial, initial_state_on};
 use crate::trace::{Actor, Episode, Provenance};
+use crate::words::counted;
 
 /// Why a policy cannot act.
 #[expect(missing_docs, reason = "the messages say what each field is")]
@@ -57,7 +58,7 @@ pub enum DeployError {
     Family { path: PathBuf, found: Family, expected: Family },
     #[error("{}: {variant} looks at pictures, but a robot reports positions alone", path.display())]
     Sees { path: PathBuf, variant: String },
-    #[error("{}: is for {found} slots, but the scene has {expected}", path.display())]
+    #[error("{}: is for {found}, but the scene has {expected}", path.display(), found = counted(*found, "slot"))]
     Slots { path: PathBuf, found: usize, expected: usize },
     #[error("the episode of {task_id} shows nothing to be done: it is no whole demonstration of an expert")]
     NoTask { task_id: String },

@@ -17,6 +17,7 @@ use crate::remote::{Session, connect};
 use crate::rollout::RolloutEpisode;
 use crate::task;
 use crate::trace::{Actor, Episode, Provenance};
+use crate::words::counted;
 
 /// In place of a model: do what the demonstration shows.
 const ORACLE: &str = "oracle";
@@ -34,7 +35,7 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
         Ok::<_, DeployError>(Trials { task, demonstration, counts: counts.clone(), seed: args.seed })
     };
     let trials = demonstrations.iter().map(trials).collect::<Result<Vec<_>, _>>()?;
-    let to_record = args.record.as_deref().map(Record::begin).transpose()?;
+    let mut record = args.record.as_deref().map(Record::begin).transpose()?;
     let session = session(args, &trials[0], stop)?;
     let acted = match args.dry_run {
         true => {
@@ -44,13 +45,12 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
             let rehearsal = rehearse(&session, trials[0].task.family, tell)?;
             vec![trials[0].act(&mut driver, &rehearsal, 0, false)?]
         }
-        false => act(args, &trials, &mut driver, &session)?,
+        false => act(args, &trials, &mut driver, &session, record.as_mut())?,
     };
-    if let Some(to_record) = to_record {
-        let model = StageDir::new("train", &args.model).version().ok();
-        to_record.finish(&Recorded { trials: &trials, driver: &driver, model, session: &session }, &acted)?;
+    if let Some(record) = record {
+        record.finish(&recorded(args, &trials, &driver, &session))?;
     }
-    conclude(args, &session, &acted, stop)
+    conclude(args, &session, &acted, asked(args, &trials), stop)
 }
 
 /// The expert's episodes that show what is to be done, all of one family.
@@ -84,12 +84,24 @@ fn session(args: &ActArgs, trials: &Trials<'_>, stop: &Arc<AtomicBool>) -> anyho
     Ok(Session::begin(wire, &args.robot.to_string(), family, scene, deadline).map_err(DeployError::from)?)
 }
 
-/// Acts the trials of each demonstration, until the robot is lost.
+/// How many trials are asked for.
+fn asked(args: &ActArgs, demonstrated: &[Trials<'_>]) -> usize {
+    demonstrated.len() * args.trials as usize
+}
+
+/// What the acted episodes depend on.
+fn recorded<'a>(args: &ActArgs, trials: &'a [Trials<'a>], driver: &'a Driver, session: &'a Session) -> Recorded<'a> {
+    let model = StageDir::new("train", &args.model).version().ok();
+    Recorded { trials, driver, model, session, n_asked: asked(args, trials) }
+}
+
+/// Acts the trials of each demonstration, until the robot is lost. Each is recorded as soon as it has ended.
 fn act(
     args: &ActArgs,
     demonstrated: &[Trials<'_>],
     driver: &mut Driver,
     session: &Session,
+    mut record: Option<&mut Record>,
 ) -> Result<Vec<RolloutEpisode>, DeployError> {
     let mut acted = Vec::new();
     let each = demonstrated.iter().flat_map(|trials| (0..args.trials).map(move |_| trials));
@@ -100,8 +112,12 @@ fn act(
             Err(DeployError::Remote(_)) if !acted.is_empty() => break,
             Err(error) => return Err(error),
         };
-        output::note(&in_words(index, &rollout));
+        let words = in_words(index, &rollout);
         acted.push(rollout);
+        if let Some(record) = &mut record {
+            record.add(&recorded(args, demonstrated, driver, session), &acted)?;
+        }
+        output::note(&words);
         if session.lost().is_some() {
             break;
         }
@@ -113,16 +129,17 @@ fn in_words(index: u32, RolloutEpisode { episode, decisions, first_divergence, .
     let secs = episode.frames.last().map_or(0.0, |frame| frame.time_nanos as f64 / 1e9);
     let divergence =
         first_divergence.map_or(String::new(), |divergence| format!("; leaves the expert at {divergence}"));
-    format!("trial {index}: {}, {decisions} decisions, {secs:.1} s{divergence}", episode.outcome)
+    let decisions = counted(*decisions, "decision");
+    format!("trial {index}: {}, {decisions}, {secs:.1} s{divergence}", episode.outcome)
 }
 
 fn conclude(
     args: &ActArgs,
     session: &Session,
     acted: &[RolloutEpisode],
+    n_asked: usize,
     stop: &AtomicBool,
 ) -> anyhow::Result<CommandOutcome> {
-    let n_asked = args.episode.len() * args.trials as usize;
     let n_succeeded = acted.iter().filter(|rollout| rollout.episode.outcome.is_success()).count();
     let (robot, lost) = (session.robot(), session.lost());
     let recorded = args.record.as_deref().map(Path::display);

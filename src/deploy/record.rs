@@ -1,6 +1,11 @@
-//! Acted episodes as a folder like a suite's: a recording, `rollouts.parquet`, plan and manifest.
+//! Acted episodes as a folder like a suite's: recordings, `rollouts.parquet`, plan and manifest.
+//!
+//! # Invariants
+//!
+//! A trial that has ended is in the folder at once, whole and under its final name, and the table tells of it; so a
+//! process that is killed loses the trial that it is acting, and no other. The manifest comes at the end.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -13,7 +18,6 @@ use crate::rollout::{Acted, RolloutEpisode, RolloutRows, SuiteFacts};
 
 /// The name of the stage in plan and manifest, and of the suite in the table.
 const STAGE: &str = "deploy";
-const RECORDING: &str = "recordings/shard-00000-of-00001.mcap";
 const TABLE: &str = "rollouts.parquet";
 
 /// What the episodes depend on.
@@ -26,6 +30,8 @@ pub struct Recorded<'a> {
     pub model: Option<String>,
     /// Who acted.
     pub session: &'a Session,
+    /// How many trials were asked for, of all demonstrations together.
+    pub n_asked: usize,
 }
 
 impl Recorded<'_> {
@@ -67,7 +73,7 @@ impl Recorded<'_> {
     }
 
     fn plan(&self) -> Plan {
-        let Self { trials, driver, model, session } = self;
+        let Self { trials, driver, model, session, n_asked: _ } = self;
         let shown = |trials: &Trials<'_>| {
             let shown = &trials.demonstration.provenance;
             json!({ "task_id": shown.task_id, "trial": shown.trial, "seed": shown.seed })
@@ -84,8 +90,13 @@ impl Recorded<'_> {
     }
 }
 
-/// A folder to be written, which appears whole.
-pub struct Record(StagedDir);
+/// A folder that is written trial by trial. It appears with the first.
+pub struct Record {
+    /// Until it has appeared.
+    staged: Option<StagedDir>,
+    folder: PathBuf,
+    files: Vec<FileEntry>,
+}
 
 impl Record {
     /// Begins a folder, which must be new or empty: before a robot moves, so that nothing is acted that cannot be kept.
@@ -94,34 +105,54 @@ impl Record {
     ///
     /// When there is something in it, or it cannot be made.
     pub fn begin(folder: &Path) -> Result<Self, DeployError> {
-        Ok(Self(StagedDir::begin(folder)?))
+        let staged = StagedDir::begin(folder)?;
+        let folder = staged.path().to_owned();
+        Ok(Self { staged: Some(staged), folder, files: Vec::new() })
     }
 
-    /// Writes it.
+    /// Adds the last of the trials that were acted.
     ///
     /// # Errors
     ///
-    /// When it cannot be written.
-    pub fn finish(self, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
-        write(self.0.partial_path(), recorded, acted)?;
-        Ok(self.0.commit()?)
+    /// When it cannot be written; those before it stay.
+    pub fn add(&mut self, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
+        let Some((last, before)) = acted.split_last() else { return Ok(()) };
+        let folder = self.staged.as_ref().map_or(self.folder.as_path(), StagedDir::partial_path).to_owned();
+        let (dir, plan) = (StageDir::new(STAGE, &folder), recorded.plan());
+        if self.staged.is_some() {
+            dir.write_plan(&plan)?;
+        }
+        let name = recording_name(before.len(), recorded.n_asked);
+        let mut writer = ShardWriter::create(&folder.join(&name), &serde_json::to_string(&plan).unwrap_or_default())?;
+        writer.write(&last.episode)?;
+        writer.finish()?;
+        self.files.push(FileEntry::of(&folder, &name)?);
+        RolloutRows::of(STAGE, &recorded.suite(), &recorded.acted(), acted).write(&folder.join(TABLE))?;
+        dir.replace_shard(&Receipt {
+            plan_id: plan.id(),
+            shard: 0,
+            episodes: acted.len() as u64,
+            failed: acted.iter().filter(|rollout| !rollout.episode.outcome.is_success()).count() as u64,
+            files: self.files.clone(),
+        })?;
+        self.staged.take().map_or(Ok(()), |staged| Ok(staged.commit()?))
+    }
+
+    /// Says that there are no more trials.
+    ///
+    /// # Errors
+    ///
+    /// When the manifest cannot be written.
+    pub fn finish(self, recorded: &Recorded<'_>) -> Result<(), DeployError> {
+        // Where no trial has ended there is no folder.
+        if self.staged.is_none() {
+            StageDir::new(STAGE, &self.folder).commit(&recorded.plan(), &[TABLE])?;
+        }
+        Ok(())
     }
 }
 
-fn write(path: &Path, recorded: &Recorded<'_>, acted: &[RolloutEpisode]) -> Result<(), DeployError> {
-    let (dir, plan) = (StageDir::new(STAGE, path), recorded.plan());
-    dir.write_plan(&plan)?;
-    let mut writer = ShardWriter::create(&path.join(RECORDING), &serde_json::to_string(&plan).unwrap_or_default())?;
-    acted.iter().try_for_each(|rollout| writer.write(&rollout.episode))?;
-    writer.finish()?;
-    RolloutRows::of(STAGE, &recorded.suite(), &recorded.acted(), acted).write(&path.join(TABLE))?;
-    dir.commit_shard(&Receipt {
-        plan_id: plan.id(),
-        shard: 0,
-        episodes: acted.len() as u64,
-        failed: acted.iter().filter(|rollout| !rollout.episode.outcome.is_success()).count() as u64,
-        files: vec![FileEntry::of(path, RECORDING)?],
-    })?;
-    dir.commit(&plan, &[TABLE])?;
-    Ok(())
+/// A recording for each trial, named so that they are in order.
+fn recording_name(trial: usize, n_asked: usize) -> String {
+    format!("recordings/shard-{trial:05}-of-{n_asked:05}.mcap")
 }

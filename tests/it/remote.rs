@@ -10,12 +10,12 @@ use std::time::Duration;
 
 use ntp::artifact::Plan;
 use ntp::deploy::{Driver, Trials, rehearse, shown_task};
-use ntp::recording::ShardWriter;
+use ntp::recording::{ShardReader, ShardWriter};
 use ntp::remote::{
     Address, InProcess, LinkProblem, RemoteProblem, RemoteRobot, Session, SimulatedRobot, Wire, connect,
 };
 use ntp::robot::{Action, RobotApi as _};
-use ntp::rollout::{Limits, Oracle, RolloutEpisode, Start, run};
+use ntp::rollout::{Limits, Oracle, RolloutEpisode, RolloutRows, Start, run};
 use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::sim::{Simulation, SimulationConfig};
@@ -30,8 +30,12 @@ use wires::{Lines, Spoiled, Told, methods, scripted};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn trials(demonstration: &Episode) -> Trials<'_> {
+    trials_of_seed(demonstration, 3)
+}
+
+fn trials_of_seed(demonstration: &Episode, seed: u64) -> Trials<'_> {
     let counts = demonstration.provenance.counts.clone();
-    Trials { task: shown_task(demonstration).unwrap(), demonstration, counts, seed: 3 }
+    Trials { task: shown_task(demonstration).unwrap(), demonstration, counts, seed }
 }
 
 fn greet(wire: impl Wire + 'static, trials: &Trials<'_>) -> Session {
@@ -435,6 +439,62 @@ fn a_robot_does_not_move_for_what_cannot_be_recorded() {
     assert_eq!(acted.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&acted.stderr).contains("only a new or empty folder is written"));
     assert!(!folder.path().join("asked.jsonl").exists(), "the robot was asked something");
+}
+
+/// Episodes of the recordings of a folder, file by file.
+fn recorded_in(folder: &Path) -> Vec<Vec<Episode>> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
+    files.sort();
+    files.iter().map(|path| ShardReader::open(path).unwrap().collect::<Result<_, _>>().unwrap()).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn trials_that_have_ended_outlive_a_kill() {
+    let folder = recording();
+    let robot = format!("{} robot --family block_stacking", binary());
+    let (n_asked, acted) = ("1000", folder.path().join("acted"));
+    let mut child = Command::new(binary())
+        .args(["act", "oracle", "--demonstration", "shown.mcap", "--robot", &robot])
+        .args(["--reset", "--trials", n_asked, "--record", "acted"])
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // A trial is in the folder as soon as it has ended.
+    let n_files = || std::fs::read_dir(acted.join("recordings")).map_or(0, Iterator::count);
+    for _ in 0..1200 {
+        if n_files() >= 3 {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(child.try_wait().unwrap().is_none(), "it had ended by itself");
+    // On Unix this is SIGKILL.
+    child.kill().unwrap();
+    let status = child.wait().unwrap();
+    assert_eq!(std::os::unix::process::ExitStatusExt::signal(&status), Some(9));
+    let recorded = recorded_in(&acted.join("recordings"));
+    assert!(recorded.len() >= 3, "{}", recorded.len());
+    let demonstration = recorded_in(folder.path()).remove(0).remove(0);
+    let trials = trials_of_seed(&demonstration, 0);
+    for (index, episodes) in (0..3).zip(&recorded) {
+        assert_eq!(episodes[..], [in_process(&trials, index).episode], "trial {index}");
+    }
+    // The table follows each recording; the kill may have come between the two.
+    let rows = RolloutRows::read(&acted.join("rollouts.parquet")).unwrap().successes();
+    assert!(rows.0 >= 2 && (recorded.len() - 1..=recorded.len()).contains(&rows.0), "{rows:?}");
+    let check =
+        |arguments: &[&str]| Command::new(binary()).args(arguments).current_dir(folder.path()).output().unwrap();
+    let valid = check(&["validate", "acted"]);
+    assert_eq!(valid.status.code(), Some(0), "{}", String::from_utf8_lossy(&valid.stdout));
+    // Nothing is written over it.
+    let again = check(&["act", "oracle", "--demonstration", "shown.mcap", "--robot", &robot, "--record", "acted"]);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("only a new or empty folder is written"));
 }
 
 #[cfg(unix)]
