@@ -56,6 +56,8 @@ Words:
              (a maximum contiguous subsequence sum), am the likeliest start and the best end for it
 
 Results go to stdout, progress to stderr.
+Datasets and recordings are written under new names alone. A picture, a video, a table or another
+file of results takes the place of one of its name, unless the command reads it.
 Exit codes: 0 done; 1 failed, or a check failed; 2 wrong usage or pipeline file; \
 3 done, but something was left out, or left to do; 130 interrupted (the same command carries on).";
 
@@ -95,10 +97,14 @@ pub enum Command {
     /// Draw an episode as a video, a GIF or one picture.
     Render(RenderArgs),
     /// Answer an SQL statement about a dataset, a run, rollouts or a model.
+    ///
+    /// Files are read as they are, without a look at their hashes: `ntp validate` is the check.
     Query(QueryArgs),
     /// Say where an episode, a frame or a model comes from: recording, settings, commit.
     Explain(ExplainArgs),
     /// Save what is whole of a broken dataset or recording.
+    ///
+    /// Of a recording of others, whatever is in it, every chunk that is whole is kept.
     Repair(RepairArgs),
     /// Merge, filter, split, compare, export and import datasets.
     #[command(subcommand)]
@@ -361,9 +367,9 @@ pub struct PathArgs {
 pub struct ReplayArgs {
     /// A recording (.mcap), a folder of recordings or rollouts, or a dataset.
     pub path: PathBuf,
-    /// The episode's number; several with commas between them.
-    #[arg(long, value_name = "K", value_delimiter = ',', required = true)]
-    pub episode: Vec<u64>,
+    /// Numbers of episodes, such as 0-9,12.
+    #[arg(long, alias = "episodes", value_name = "RANGES", value_delimiter = ',', required = true)]
+    pub episode: Vec<EpisodeRange>,
     /// Write a file that `rerun FILE.rrd` opens.
     #[arg(long, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "verify"])]
     pub save: Option<PathBuf>,
@@ -384,7 +390,7 @@ pub struct RenderArgs {
     /// A recording (.mcap), or a folder of recordings or rollouts.
     pub path: PathBuf,
     /// The episode's number.
-    #[arg(long, value_name = "K")]
+    #[arg(long, alias = "episodes", value_name = "K", value_parser = one_episode)]
     pub episode: u64,
     /// The camera: front, wrist, or one that the recording names.
     #[arg(long, value_name = "NAME", default_value = "front")]
@@ -498,9 +504,9 @@ pub struct ActArgs {
     /// A recording (.mcap) with the demonstration, or a folder of recordings.
     #[arg(long, value_name = "PATH")]
     pub demonstration: PathBuf,
-    /// Which of its episodes, by its number; several with commas, one task after the other.
-    #[arg(long, value_name = "K", value_delimiter = ',', default_value = "0")]
-    pub episode: Vec<u64>,
+    /// Numbers of its episodes, such as 0-9,12: one task after the other.
+    #[arg(long, alias = "episodes", value_name = "RANGES", value_delimiter = ',', default_value = "0")]
+    pub episode: Vec<EpisodeRange>,
     /// The robot: a command that starts it, or tcp://HOST:PORT.
     #[arg(long, value_name = "ROBOT")]
     pub robot: Address,
@@ -557,7 +563,7 @@ pub struct ExplainArgs {
     /// A dataset, or a model.
     pub path: PathBuf,
     /// The number of an episode of the dataset.
-    #[arg(long, value_name = "K")]
+    #[arg(long, alias = "episodes", value_name = "K", value_parser = one_episode)]
     pub episode: Option<u64>,
     /// The number of a frame of the episode.
     #[arg(long, value_name = "F", requires = "episode")]
@@ -724,7 +730,7 @@ pub struct FilterArgs {
     #[arg(long, value_name = "SPLIT")]
     pub split: Option<String>,
     /// Numbers of episodes, such as 0-9,12.
-    #[arg(long, value_name = "RANGES", value_delimiter = ',')]
+    #[arg(long, alias = "episode", value_name = "RANGES", value_delimiter = ',')]
     pub episodes: Vec<EpisodeRange>,
     /// The least number of frames.
     #[arg(long, value_name = "N")]
@@ -787,6 +793,11 @@ pub struct DiffArgs {
 fn speed(text: &str) -> Result<f32, String> {
     let speed: f32 = text.parse().map_err(|_error| format!("{text:?} is no number"))?;
     if speed > 0.0 && speed <= 1000.0 { Ok(speed) } else { Err("allowed: above 0, up to 1000".to_owned()) }
+}
+
+/// The number of one episode, where several make no sense.
+fn one_episode(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_error| format!("{text:?} is not the number of one episode, such as 3"))
 }
 
 /// A share, 0 to 1.

@@ -36,6 +36,7 @@ mod shared;
 mod spec;
 mod stage;
 mod stage_report;
+mod stale;
 mod study;
 mod tasks;
 mod train;
@@ -59,5 +60,6 @@ pub use spec::{
 };
 pub use stage::Stage;
 pub use stage_report::{StageReport, Status};
+pub use stale::{Stale, stale};
 pub use study::{PipelineFile, Study, StudySpec};
 pub use verify::{Verification, verify};

@@ -52,6 +52,7 @@ use polars::error::PolarsError;
 
 use crate::annotate::Measured;
 use crate::artifact::{self, IoError};
+use crate::words::counted;
 
 /// What a report is made of. Any part may be empty: a report of a run that has only trained is a report.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -114,7 +115,7 @@ pub enum ReportError {
         problem: String,
     },
     /// A rollouts table contradicts itself.
-    #[error("{rows} rows in which {problem}: {}", path.display())]
+    #[error("{rows} in which {problem}: {}", path.display(), rows = counted(*rows, "row"))]
     Rows {
         /// Which file.
         path: PathBuf,
@@ -124,7 +125,7 @@ pub enum ReportError {
         problem: &'static str,
     },
     /// An episode would count twice.
-    #[error("{rows} episodes of {}, suite {suite}, training seed {seed} occur more than once", told(actor))]
+    #[error("{rows} of {}, suite {suite}, training seed {seed} occur more than once", told(actor), rows = counted(*rows, "episode"))]
     Repeated {
         /// Of which actor.
         actor: Box<Actor>,
@@ -157,7 +158,7 @@ fn told(actor: &Actor) -> String {
         told.push_str(&format!(" ({tag})"));
     }
     if let Some(tasks) = train_tasks {
-        told.push_str(&format!(" trained on {tasks} tasks"));
+        told.push_str(&format!(" trained on {tasks}", tasks = counted(*tasks, "task")));
     }
     if let Some(decoder) = decoder {
         told.push_str(&format!(", decoder {decoder}"));

@@ -70,6 +70,7 @@ use crate::training::detector::DetectorRun;
 use crate::training::facts::{Facts, facts_of};
 use crate::training::run::Run;
 use crate::training::start::Start;
+use crate::words::counted;
 
 /// Name of the learning curves in a model's folder.
 pub const METRICS_FILE: &str = "metrics.parquet";
@@ -262,7 +263,10 @@ fn check_kernel(kernel: u32, longest: usize) -> Result<(), TrainError> {
     if kernel as usize > longest {
         return Err(TrainError::Config {
             key: "scope_kernel",
-            found: format!("{kernel}, and the longest demonstration has {longest} frames"),
+            found: format!(
+                "{kernel}, and the longest demonstration has {longest}",
+                longest = counted(longest, "frame")
+            ),
             allowed: "at most as many frames as a demonstration has",
         });
     }
@@ -274,7 +278,7 @@ fn check_colours(variant: Variant, colours: u32, n_slots: usize) -> Result<(), T
     if variant.detects() && (colours as usize) < n_slots + 1 {
         return Err(TrainError::Config {
             key: "colours",
-            found: format!("{colours} with {n_slots} slots"),
+            found: format!("{colours} with {n_slots}", n_slots = counted(n_slots, "slot")),
             allowed: "more colours than slots for a detector",
         });
     }

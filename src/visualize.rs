@@ -66,6 +66,7 @@ use crate::trace::{Actor, Episode};
 use crate::video::VideoError;
 use crate::visualize::rrd::RrdFile;
 use crate::visualize::store::Store;
+use crate::words::counted;
 
 /// What all recordings of this project have in common in Rerun.
 pub const APPLICATION_ID: &str = "ntp";
@@ -111,9 +112,8 @@ pub enum VisualizeError {
     NoEpisodes,
     /// The demonstration is of another length than the one that the rollout was given.
     #[error(
-        "episode {episode} was given a specification of {expected} frames, but the demonstration to show beside it \
-         (episode {demonstration}) has {found} boundary frames"
-    )]
+        "episode {episode} was given a specification of {expected}, but the demonstration to show beside it \
+         (episode {demonstration}) has {found} boundary frames", expected = counted(*expected, "frame"))]
     ForeignDemonstration {
         /// Number of the rollout.
         episode: u64,

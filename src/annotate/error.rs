@@ -7,6 +7,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::model::ModelError;
 use crate::rollout::PolicyError;
+use crate::words::counted;
 
 /// Demonstrations could not be annotated.
 #[derive(Debug, thiserror::Error)]
@@ -38,7 +39,7 @@ pub enum AnnotateError {
         found: String,
     },
     /// No model knows such slots.
-    #[error("{}: its observations have {n_slots} slots ({slots}), but {models}", path.display())]
+    #[error("{}: its observations have {n_slots} ({slots}), but {models}", path.display(), n_slots = counted(*n_slots, "slot"))]
     NoModel {
         /// The dataset.
         path: PathBuf,

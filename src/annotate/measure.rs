@@ -23,6 +23,7 @@ use crate::dataset::{LabelledEpisode, LabelledEpisodes};
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{ProgramCall, Span};
+use crate::words::counted;
 use level::Tally;
 
 /// The levels.
@@ -92,7 +93,8 @@ pub fn measure(truth: &Path, labelled: &Path) -> Result<Measured, AnnotateError>
             (right, found) => {
                 let frames = |of: &Option<LabelledEpisode>| of.as_ref().map_or(0, LabelledEpisode::n_frames);
                 let (episode, of) = (all.episodes, frames(&right));
-                let problem = format!("episode {episode} has {of} frames here, but {} there", frames(&found));
+                let problem =
+                    format!("episode {episode} has {of} here, but {} there", frames(&found), of = counted(of, "frame"));
                 return Err(differ(problem));
             }
         };

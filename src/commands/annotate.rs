@@ -5,6 +5,7 @@ use crate::cli::{AnnotateArgs, KeyFrameChoice};
 use crate::commands::dataset::refuse_within;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::model::Decoder;
+use crate::words::{counted, shell_path};
 
 /// Doubtful episodes that are printed; all are in `ntp/annotation.json`.
 const LISTED: usize = 20;
@@ -37,11 +38,13 @@ fn in_words(args: &AnnotateArgs, annotation: &Annotation) -> String {
     let (summary, to) = (annotation.summary, args.to.display());
     let (episodes, n_doubtful) = (summary.episodes, annotation.doubtful.len());
     let mut lines = vec![format!(
-        "{to}: {episodes} episodes, {} calls, {n_doubtful} doubtful; key frames {}",
-        summary.calls, annotation.key_frames
+        "{to}: {}, {}, {n_doubtful} doubtful; key frames {}",
+        counted(episodes, "episode"),
+        counted(summary.calls, "call"),
+        annotation.key_frames
     )];
     for model in annotation.models.iter().filter(|_| annotation.models.len() > 1) {
-        lines.push(format!("  model {} ({}): {} episodes", model.name, model.family.name(), model.episodes));
+        lines.push(format!("  model {} ({}): {}", model.name, model.family.name(), counted(model.episodes, "episode")));
     }
     lines.extend(annotation.doubtful.iter().take(LISTED).map(|doubtful| doubt_in_words(args, doubtful)));
     if n_doubtful > LISTED {
@@ -55,7 +58,7 @@ fn doubt_in_words(args: &AnnotateArgs, doubtful: &Doubtful) -> String {
     let Doubtful { episode, confidence, doubts } = doubtful;
     let first = doubts.first().map(ToString::to_string).unwrap_or_default();
     let more = if doubts.len() > 1 { format!(" and {} more", doubts.len() - 1) } else { String::new() };
-    let replay = format!("ntp replay {} --episode {episode} --spawn", args.to.display());
+    let replay = format!("ntp replay {} --episode {episode} --spawn", shell_path(&args.to));
     format!("  episode {episode}, confidence {confidence:.2}: {first}{more}\n    {replay}")
 }
 
@@ -63,7 +66,12 @@ fn doubt_in_words(args: &AnnotateArgs, doubtful: &Doubtful) -> String {
 fn table(measured: &Measured) -> String {
     let percent = |part: u64, of: u64| format!("{:.1} %", 100.0 * part as f64 / of.max(1) as f64);
     let mut lines = vec![
-        format!("against {}: {} episodes, {} frames", measured.truth, measured.episodes, measured.frames),
+        format!(
+            "against {}: {}, {}",
+            measured.truth,
+            counted(measured.episodes, "episode"),
+            counted(measured.frames, "frame")
+        ),
         format!("  calls with right program and frames      {}", percent(measured.calls_with_span, measured.calls)),
         format!("  … and arguments                          {}", percent(measured.calls_with_argument, measured.calls)),
         format!("  episodes with every call right           {}", percent(measured.episodes_exact, measured.episodes)),

@@ -9,6 +9,7 @@ use crate::cli::{StatusArgs, SubmitArgs};
 use crate::cluster::{self, FailedItem, StageStatus, Submission, SubmitOptions, SubmittedStage};
 use crate::commands::{CommandOutcome, output};
 use crate::pipeline::{ItemRanges, PipelineFile};
+use crate::words::{counted, shell_path};
 
 /// How often a run is looked at with `--watch`.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);
@@ -45,7 +46,7 @@ fn in_words(submission: &Submission) -> String {
     let line = |stage: &SubmittedStage| {
         let SubmittedStage { folder, stage, items, tasks } = stage;
         let folder = if folder == "." { String::new() } else { format!("{folder}: ") };
-        format!("{folder}{stage}: {items} items left, in {tasks} tasks")
+        format!("{folder}{stage}: {} left, in {}", counted(*items, "item"), counted(*tasks, "task"))
     };
     let mut lines: Vec<String> = submission.stages.iter().map(line).collect();
     lines.push(match submission.stages.is_empty() {
@@ -76,7 +77,7 @@ pub(super) fn status(args: &StatusArgs) -> anyhow::Result<CommandOutcome> {
 fn lines(stage: &StageStatus) -> Vec<String> {
     let StageStatus { experiment, stage, items, done, left, failed } = stage;
     let experiment = experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
-    let mut line = format!("{experiment}{stage}: {done} of {items} items done");
+    let mut line = format!("{experiment}{stage}: {done} of {} done", counted(*items, "item"));
     if !left.is_empty() {
         let numbers: ItemRanges = left.iter().copied().collect();
         line.push_str(&format!(", {} left: {numbers}", left.len()));
@@ -86,9 +87,10 @@ fn lines(stage: &StageStatus) -> Vec<String> {
     }
     let failure = |failed: &FailedItem| {
         let FailedItem { item, unit, message, attempts, node, log } = failed;
+        let attempts = counted(*attempts, "time");
         let node = node.as_ref().map(|node| format!(" on {node}")).unwrap_or_default();
-        let log = log.as_ref().map(|log| format!(" (tail -F {})", log.display())).unwrap_or_default();
-        format!("  item {item} of {unit} failed {attempts} times{node}: {message}{log}")
+        let log = log.as_ref().map(|log| format!(" (tail -F {})", shell_path(log))).unwrap_or_default();
+        format!("  item {item} of {unit} failed {attempts}{node}: {message}{log}")
     };
     std::iter::once(line).chain(failed.iter().map(failure)).collect()
 }

@@ -5,6 +5,7 @@ use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::{CallFacts, EpisodeFacts, FrameFacts};
 use crate::lineage::{EpisodeLineage, RecordingLineage, StageLineage, explain_episode, explain_model};
+use crate::words::counted;
 
 pub(super) fn run(args: &ExplainArgs) -> anyhow::Result<CommandOutcome> {
     match (Kind::of(&args.path)?, args.episode) {
@@ -75,7 +76,10 @@ fn facts_text(episode: &EpisodeFacts, with_calls: bool) -> Vec<String> {
         episode;
     let mut lines = vec![
         format!("episode {episode_index}: {task_text}"),
-        format!("  task {task_id} ({family}, {split}), trial {trial}, acted by {actor}, {outcome}, {n_frames} frames"),
+        format!(
+            "  task {task_id} ({family}, {split}), trial {trial}, acted by {actor}, {outcome}, {}",
+            counted(*n_frames, "frame")
+        ),
     ];
     if with_calls {
         lines.extend(episode.calls.iter().map(|call| format!("  {}", call_text(call))));

@@ -6,6 +6,7 @@ use crate::cli::ItemsArgs;
 use crate::commands::stages::run_directory;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineFile, RunDir, Stage};
+use crate::words::counted;
 
 pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
     let file = PipelineFile::load(&args.pipeline)?;
@@ -45,12 +46,12 @@ fn to_json((experiment, item): &(Option<&str>, Item)) -> anyhow::Result<Value> {
 
 /// `generate 3  generate shard 3 of 8  100 episodes  done`.
 fn to_line((experiment, item): &(Option<&str>, Item)) -> String {
-    let Item { item: number, stage, unit, shard, shards, amount, counted, state, failure } = item;
+    let Item { item: number, stage, unit, shard, shards, amount, counted: _, of, state, failure } = item;
     let experiment = experiment.map(|name| format!("{name}: ")).unwrap_or_default();
     let state = match (state, failure) {
         (ItemState::Done, _) => "done".to_owned(),
         (ItemState::Left, _) | (ItemState::Failed, None) => "left".to_owned(),
         (ItemState::Failed, Some(failure)) => format!("failed: {}", failure.message),
     };
-    format!("{experiment}{stage} {number}  {unit} shard {shard} of {shards}  {amount} {counted}  {state}")
+    format!("{experiment}{stage} {number}  {unit} shard {shard} of {shards}  {}  {state}", counted(*amount, of))
 }

@@ -1,28 +1,34 @@
 //! The two streams: results on stdout, complaints on stderr.
 
 use std::io::Write as _;
+use std::path::Path;
 
 use serde::Serialize;
+
+use crate::commands::UsageError;
+
+/// A result could not be printed.
+#[derive(Debug, thiserror::Error)]
+#[error("failed to write to stdout: {0}")]
+struct StdoutError(#[source] std::io::Error);
 
 /// Prints a result.
 ///
 /// # Errors
 ///
-/// When stdout is closed.
+/// When stdout is closed, or what it goes to is full.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
+    let end = if text.ends_with('\n') { "" } else { "\n" };
     let mut stdout = std::io::stdout().lock();
-    stdout.write_all(text.as_bytes())?;
-    if !text.ends_with('\n') {
-        stdout.write_all(b"\n")?;
-    }
-    Ok(())
+    let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.write_all(end.as_bytes()));
+    Ok(written.and_then(|()| stdout.flush()).map_err(StdoutError)?)
 }
 
 /// Prints a result as indented JSON.
 ///
 /// # Errors
 ///
-/// When stdout is closed.
+/// As [`print`].
 pub(super) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print(&serde_json::to_string_pretty(value)?)
 }
@@ -46,9 +52,20 @@ pub(super) fn note(text: &str) {
     let _closed = writeln!(std::io::stderr().lock(), "{text}");
 }
 
+/// Refuses to write a file over one that the command reads. Other files of the name are replaced, whole.
+pub(super) fn refuse_replacing(source: &Path, option: &str, to: &Path) -> Result<(), UsageError> {
+    let (Ok(read), Ok(there)) = (source.canonicalize(), to.canonicalize()) else { return Ok(()) };
+    if there.is_file() && there.starts_with(&read) {
+        let (to, source) = (to.display(), source.display());
+        return Err(UsageError(format!("{option} {to}: this file is of {source}, which is read; choose another name")));
+    }
+    Ok(())
+}
+
 /// Whether the reader of stdout went away, which is no failure (`ntp … | head`).
 pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let io = error.downcast_ref::<std::io::Error>();
+    let of_stdout = error.downcast_ref::<StdoutError>().map(|StdoutError(error)| error);
+    let io = of_stdout.or_else(|| error.downcast_ref::<std::io::Error>());
     io.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
 }
 

@@ -9,6 +9,7 @@ use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::summarize;
 use crate::publish::{Place, Publication, publish};
+use crate::words::{counted, shell_path};
 
 pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
     let kind = Kind::of(&args.dataset)?;
@@ -22,15 +23,22 @@ pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<
         output::print_json(&summary)?;
     } else {
         output::print(&format!(
-            "{} files, {} bytes, {} → {} ({} written, {} there already)",
-            summary.files, summary.bytes, publication.license.spdx, args.to, summary.copied, summary.kept
+            "{}, {}, {} → {} ({} written, {} there already)",
+            counted(summary.files, "file"),
+            counted(summary.bytes, "byte"),
+            publication.license.spdx,
+            args.to,
+            summary.copied,
+            summary.kept
         ))?;
         if let Place::Folder(folder) = &args.to {
-            output::note(&format!("to the Hugging Face hub: sh {}/upload.sh OWNER/NAME", folder.display()));
+            let script = shell_path(&folder.join("upload.sh"));
+            output::note(&format!("to the Hugging Face hub: sh {script} OWNER/NAME"));
         }
     }
     if summary.warnings > 0 {
-        output::note(&format!("{} warnings: ntp validate {}", summary.warnings, args.dataset.display()));
+        let warnings = counted(summary.warnings, "warning");
+        output::note(&format!("{warnings}: ntp validate {}", shell_path(&args.dataset)));
     }
     summary.left_out.iter().for_each(|left_out| output::note(&format!("left out: {left_out}")));
     Ok(if summary.left_out.is_empty() { CommandOutcome::Done } else { CommandOutcome::LeftOut })
@@ -55,15 +63,17 @@ fn publication(args: &PublishArgs) -> anyhow::Result<Publication> {
     })
 }
 
-/// Of a dataset of ours by its families, of others by the folder's name.
+/// Of a dataset of ours by its families; of others, whose programs are of no family or that have none, by the folder's
+/// name.
 fn default_name(dataset: &Path) -> anyhow::Result<String> {
     let summary = summarize(dataset)?;
-    if summary.declared.is_none() {
+    if summary.declared.is_none() && !summary.families.is_empty() {
         return Ok(format!("NTP demonstrations: {}", summary.families.join(", ").replace('_', " ")));
     }
     let folder = dataset.canonicalize().unwrap_or_else(|_gone| dataset.to_owned());
     Ok(folder
         .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
+        .map(|name| name.to_string_lossy().trim().to_owned())
+        .filter(|name| !name.is_empty() && !name.chars().any(char::is_control))
         .unwrap_or_else(|| "Robot episodes".to_owned()))
 }

@@ -6,6 +6,7 @@ use crate::cli::QueryArgs;
 use crate::commands::kind::{self, Kind};
 use crate::commands::{CommandOutcome, output};
 use crate::query::{TableInfo, Tables, query};
+use crate::words::counted;
 
 pub(super) fn run(args: &QueryArgs) -> anyhow::Result<CommandOutcome> {
     let tables = tables(&args.path)?;
@@ -13,10 +14,13 @@ pub(super) fn run(args: &QueryArgs) -> anyhow::Result<CommandOutcome> {
         describe(&tables.describe()?, args.json)?;
         return Ok(CommandOutcome::Done);
     };
+    if let Some(path) = &args.parquet {
+        output::refuse_replacing(&args.path, "--parquet", path)?;
+    }
     let answer = query(&tables, sql)?;
     if let Some(path) = &args.parquet {
         answer.write_parquet(path)?;
-        output::note(&format!("{} rows in {}", answer.n_rows(), path.display()));
+        output::note(&format!("{} in {}", counted(answer.n_rows(), "row"), path.display()));
     } else if args.json {
         output::print_json(&answer.rows())?;
     } else if args.csv {

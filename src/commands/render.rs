@@ -8,12 +8,17 @@ use crate::commands::replay::{self, Found};
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::render::{CameraConfig, PictureQuality, Viewpoint};
 use crate::video::{Clip, ClipConfig, write_gif, write_mp4, write_png};
+use crate::words::counted;
 
 /// Width and height of pictures for people.
 const SIZE_PX: [u32; 2] = [480, 480];
 
 pub(super) fn run(args: &RenderArgs) -> anyhow::Result<CommandOutcome> {
-    let found = replay::find(&args.path, &[args.episode])?.into_iter().next().context("an episode that was found")?;
+    for (option, path) in [("--mp4", &args.mp4), ("--gif", &args.gif), ("--png", &args.png)] {
+        path.iter().try_for_each(|path| output::refuse_replacing(&args.path, option, path))?;
+    }
+    let found =
+        replay::find(&args.path, &[args.episode.into()])?.into_iter().next().context("an episode that was found")?;
     let (camera, Found { file, episode, .. }) = (camera(args, &found.cameras)?, found);
     let clip = ClipConfig { fps: args.fps, speed: args.speed, programs: args.programs };
     let (written, made) = match (&args.mp4, &args.gif, &args.png) {
@@ -40,9 +45,9 @@ pub(super) fn run(args: &RenderArgs) -> anyhow::Result<CommandOutcome> {
             "written": written,
         }))?;
     } else {
-        let pictures = if n_pictures == 1 { "picture" } else { "pictures" };
+        let pictures = counted(n_pictures, "picture");
         output::print(&format!(
-            "episode {} of {} ({n_pictures} {pictures} of {width}x{height}) → {}",
+            "episode {} of {} ({pictures} of {width}x{height}) → {}",
             args.episode,
             file.display(),
             written.display()

@@ -1,4 +1,4 @@
-//! `ntp replay PATH --episode K,…`.
+//! `ntp replay PATH --episode RANGES`.
 
 #[cfg(feature = "viewer")]
 mod show;
@@ -13,6 +13,7 @@ use crate::artifact::{Plan, StageDir};
 use crate::cli::ReplayArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
+use crate::dataset::edit::EpisodeRange;
 use crate::pipeline::{self, PipelineError, Verification};
 use crate::recording::{self, ShardReader};
 use crate::render::CameraConfig;
@@ -28,6 +29,7 @@ pub(super) struct Found {
 }
 
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
+    args.save.iter().try_for_each(|path| output::refuse_replacing(&args.path, "--save", path))?;
     let is_dataset = args.path.is_dir() && Kind::of(&args.path)? == Kind::Dataset;
     match (args.verify, is_dataset) {
         (true, true) => {
@@ -75,7 +77,7 @@ struct VerifiedEpisode<'v> {
 
 /// The episodes of some numbers, counted through the recording, or through the recordings of a folder in order of
 /// names.
-pub(super) fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
+pub(super) fn find(path: &Path, ranges: &[EpisodeRange]) -> anyhow::Result<Vec<Found>> {
     let files = recordings(path)?;
     if let Some(folder) = files[0].parent().filter(|_| path.is_dir()) {
         // Episodes are counted through all recordings, so none of a finished stage may be missing.
@@ -86,20 +88,26 @@ pub(super) fn find(path: &Path, numbers: &[u64]) -> anyhow::Result<Vec<Found>> {
     let mut n_episodes = 0;
     for file in &files {
         let mut reader = ShardReader::open(file)?;
-        for &number in numbers {
-            if !(n_episodes..n_episodes + reader.n_episodes()).contains(&number) {
-                continue;
-            }
+        let end = n_episodes + reader.n_episodes();
+        let own = |range: &EpisodeRange| {
+            let numbers = range.numbers();
+            (*numbers.start()).max(n_episodes)..numbers.end().saturating_add(1).min(end)
+        };
+        for number in ranges.iter().flat_map(own) {
             let plan: Plan = serde_json::from_str(reader.plan_json())
                 .with_context(|| format!("the plan attached to {}", file.display()))?;
             let (episode, cameras) = (reader.read_episode(number - n_episodes)?, recording::cameras_of(&plan));
             found.push(Found { number, file: file.clone(), plan, episode, cameras });
         }
-        n_episodes += reader.n_episodes();
+        n_episodes = end;
     }
-    match numbers.iter().find(|&&number| number >= n_episodes) {
+    match ranges.iter().map(|range| *range.numbers().end()).find(|&last| last >= n_episodes) {
         Some(number) => anyhow::bail!("no episode {number} among the {n_episodes} of {}", path.display()),
-        None => Ok(found),
+        None => {
+            // In the order in which they are asked for.
+            found.sort_by_key(|of| ranges.iter().position(|range| range.numbers().contains(&of.number)));
+            Ok(found)
+        }
     }
 }
 

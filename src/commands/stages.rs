@@ -10,7 +10,8 @@ use crate::artifact;
 use crate::cli::{Part, ScopeArgs, StageArgs};
 use crate::commands::{CommandOutcome, output};
 use crate::model::ComputeDevice;
-use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Status};
+use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Stale, Status};
+use crate::words::{counted, shell_path};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
 pub(super) fn run(
@@ -82,7 +83,20 @@ fn run_stages(
         PipelineFile::Experiment(pipeline) => pipeline::run(pipeline, &dir, &options)?,
         PipelineFile::Study(study) => pipeline::run_study(study, &dir, &options)?,
     };
+    if options.scope == Scope::Whole {
+        say_stale(args, &pipeline::stale(&file, &dir, from), from);
+    }
     Ok((dir, reports))
+}
+
+/// Says what the stages read that the pipeline file would make otherwise now: they took it as it is.
+fn say_stale(args: &StageArgs, stale: &[Stale], from: Stage) {
+    stale.iter().for_each(|stale| output::note(&format!("stale: {stale}")));
+    if !stale.is_empty() {
+        let (pipeline, out) = (shell_path(&args.pipeline), args.out.as_deref().map(shell_path));
+        let out = out.map(|out| format!(" --out {out}")).unwrap_or_default();
+        output::note(&format!("{from} takes it as it is; ntp run {pipeline}{out} makes it anew"));
+    }
 }
 
 fn scope(args: &ScopeArgs) -> Scope {
@@ -134,8 +148,8 @@ pub(super) fn line(report: &StageReport) -> String {
     let shard = report.shard.map(|shard| format!(" shard {shard} of {}", report.shards)).unwrap_or_default();
     let episodes = match (report.episodes, report.failed) {
         (0, _) => String::new(),
-        (episodes, 0) => format!("  {episodes} episodes"),
-        (episodes, failed) => format!("  {episodes} episodes, {failed} failed"),
+        (episodes, 0) => format!("  {}", counted(episodes, "episode")),
+        (episodes, failed) => format!("  {}, {failed} failed", counted(episodes, "episode")),
     };
     let experiment = report.experiment.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
     let name = format!("{experiment}{}{shard}", report.unit);
@@ -159,12 +173,13 @@ fn undone(reports: &[StageReport]) -> Option<String> {
     let stage = reports.last()?.stage;
     let failed = reports.iter().filter(|report| report.status == Status::Failed).filter_map(|report| report.item);
     let missing = reports.iter().flat_map(|report| report.missing.iter().copied());
-    let told = |numbers: Vec<u64>, what: &str| {
+    let told = |numbers: Vec<u64>, what: [&str; 2]| {
         let count = numbers.len();
         let items: ItemRanges = numbers.into_iter().collect();
-        (count > 0).then(|| format!("{stage}: {count} items {what}: {items}"))
+        let verb = if count == 1 { what[0] } else { what[1] };
+        (count > 0).then(|| format!("{stage}: {} {verb}: {items}", counted(count, "item")))
     };
-    told(failed.collect(), "failed").or_else(|| told(missing.collect(), "are missing"))
+    told(failed.collect(), ["failed"; 2]).or_else(|| told(missing.collect(), ["is missing", "are missing"]))
 }
 
 /// Demonstrations that failed are left out of the dataset; rollouts that failed are a result.
@@ -178,6 +193,6 @@ pub(super) fn outcome(reports: &[StageReport]) -> CommandOutcome {
     if left_out == 0 {
         return CommandOutcome::Done;
     }
-    output::note(&format!("{left_out} failed demonstrations were left out of the dataset"));
+    output::note(&format!("left out of the dataset: {}", counted(left_out, "failed demonstration")));
     CommandOutcome::LeftOut
 }

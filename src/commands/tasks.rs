@@ -11,6 +11,7 @@ use crate::commands::{CommandOutcome, output, stages};
 use crate::model::ComputeDevice;
 use crate::pipeline::Stage;
 use crate::task::{self, Split, TaskSet};
+use crate::words::counted;
 
 pub(super) fn run(args: &TasksArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
     if let Some(import) = &args.import {
@@ -30,6 +31,9 @@ pub(super) fn run(args: &TasksArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Co
 }
 
 fn run_import(args: &TasksArgs, path: &Path) -> anyhow::Result<CommandOutcome> {
+    if let Some(out) = &args.out {
+        output::refuse_replacing(path, "--out", out)?;
+    }
     let tasks = task::import(path, args.train)?;
     tasks.validate()?;
     if let Some(out) = &args.out {
@@ -40,9 +44,9 @@ fn run_import(args: &TasksArgs, path: &Path) -> anyhow::Result<CommandOutcome> {
     } else {
         let count = |split| tasks.of_split(split).count();
         let text = format!(
-            "{}: {} tasks, {} seen, {} unseen",
+            "{}: {}, {} seen, {} unseen",
             tasks.family.name(),
-            tasks.tasks.len(),
+            counted(tasks.tasks.len(), "task"),
             count(Split::Seen),
             count(Split::Unseen)
         );

@@ -12,6 +12,7 @@ use crate::recording::{RecordingError, ShardReader};
 use crate::rollout::RolloutRows;
 use crate::task::TaskSet;
 use crate::trace::Episode;
+use crate::words::counted;
 use crate::{dataset, model};
 
 /// How many findings of an artifact's recordings are told; the others are counted.
@@ -72,8 +73,7 @@ fn to_text(validation: &Validation) -> String {
     lines.extend(validation.findings.iter().map(line));
     lines.push(match validation.findings.len() {
         0 => "nothing wrong".to_owned(),
-        1 => "1 finding".to_owned(),
-        n => format!("{n} findings"),
+        n => counted(n, "finding"),
     });
     lines.join("\n")
 }
@@ -83,15 +83,15 @@ fn check(path: &Path, kind: Kind, validation: &mut Validation) -> anyhow::Result
     let before = validation.findings.len();
     check_manifest(path, kind, validation);
     let held = match kind {
-        Kind::Recording => check_recordings(path, kind, validation).map(|(_, episodes)| format!("{episodes} episodes")),
+        Kind::Recording => check_recordings(path, kind, validation).map(|(_, episodes)| counted(episodes, "episode")),
         Kind::Recordings => check_recordings(path, kind, validation)
-            .map(|(files, episodes)| format!("{files} files, {episodes} episodes")),
+            .map(|(files, episodes)| format!("{}, {}", counted(files, "file"), counted(episodes, "episode"))),
         Kind::Tasks => check_tasks(path),
         Kind::Dataset => {
             check_dataset(path, validation);
             return Ok(());
         }
-        Kind::Model => model::inspect(path).map(|found| format!("{} parameters", found.parameters)).map_err(Into::into),
+        Kind::Model => model::inspect(path).map(|found| counted(found.parameters, "parameter")).map_err(Into::into),
         Kind::Rollouts => check_rollouts(path, validation),
         Kind::Report | Kind::Run | Kind::Study => Ok("report".to_owned()),
     };
@@ -153,7 +153,7 @@ fn check_recordings(path: &Path, kind: Kind, validation: &mut Validation) -> any
         }
     }
     if n_wrong > MOST_TOLD {
-        let message = format!("{} more findings", n_wrong - MOST_TOLD);
+        let message = counted(n_wrong - MOST_TOLD, "more finding");
         validation.findings.push(Finding { code: content_code(kind), path: path.to_owned(), message });
     }
     Ok((files.len(), episodes))
@@ -171,7 +171,7 @@ fn check_recording(file: &Path) -> impl Iterator<Item = Result<Episode, Recordin
 fn check_tasks(path: &Path) -> anyhow::Result<String> {
     let tasks = TaskSet::read(&path.join("tasks.json"))?;
     tasks.validate()?;
-    Ok(format!("{} tasks, no unseen goal among the seen", tasks.tasks.len()))
+    Ok(format!("{}, no unseen goal among the seen", counted(tasks.tasks.len(), "task")))
 }
 
 fn check_rollouts(path: &Path, validation: &mut Validation) -> anyhow::Result<String> {
@@ -180,7 +180,7 @@ fn check_rollouts(path: &Path, validation: &mut Validation) -> anyhow::Result<St
         check_recordings(&path.join("recordings"), Kind::Rollouts, validation)?;
     }
     let (episodes, successes) = rows.successes();
-    Ok(format!("{episodes} episodes, {successes} succeeded"))
+    Ok(format!("{}, {successes} succeeded", counted(episodes, "episode")))
 }
 
 /// Every cross-reference of a dataset; warnings are told, but fail nothing.
@@ -188,7 +188,8 @@ fn check_dataset(path: &Path, validation: &mut Validation) {
     let found = dataset::validate(path);
     if found.is_valid() {
         let dataset::Validation { episodes, frames, calls, scopes, .. } = found;
-        let held = format!("{episodes} episodes, {frames} frames, {calls} calls, {scopes} scoping labels");
+        let held = [(episodes, "episode"), (frames, "frame"), (calls, "call"), (scopes, "scoping label")];
+        let held = held.map(|(n, thing)| counted(n, thing)).join(", ");
         validation.checked.push(format!("{}: dataset, {held}", path.display()));
     }
     for finding in found.findings {
@@ -201,7 +202,7 @@ fn check_dataset(path: &Path, validation: &mut Validation) {
         if is_warning { &mut validation.warnings } else { &mut validation.findings }.push(finding);
     }
     if found.findings_left_out > 0 {
-        let message = format!("{} more findings", found.findings_left_out);
+        let message = counted(found.findings_left_out, "more finding");
         validation.findings.push(Finding { code: "DATASET", path: path.to_owned(), message });
     }
 }

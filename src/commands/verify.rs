@@ -3,6 +3,7 @@
 use crate::cli::VerifyArgs;
 use crate::commands::{CommandOutcome, output};
 use crate::publish::verify;
+use crate::words::counted;
 
 pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<CommandOutcome> {
     let verified = verify(args.copy.open()?.as_ref())?;
@@ -16,8 +17,8 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<CommandOutcome> {
         }
         let n_differences = verified.differences.len();
         lines.push(match n_differences {
-            0 => format!("all {} files are as they were published", verified.files),
-            _ => format!("{n_differences} differences among {} files", verified.files),
+            0 => format!("as published: {}", counted(verified.files, "file")),
+            n => format!("{} among {}", counted(n, "difference"), counted(verified.files, "file")),
         });
         output::print(&lines.join("\n"))?;
     }

@@ -13,6 +13,7 @@ use crate::dataset::{
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage};
 use crate::recording::{RecordingError, ShardReader};
+use crate::words::counted;
 
 /// Raised when the same settings make another dataset.
 const VERSION: u32 = 1;
@@ -43,7 +44,7 @@ impl Unit for Dataset<'_> {
 
     fn amount(&self, _shard: u32) -> Amount {
         let spec = &self.0.spec;
-        Amount { count: u64::from(spec.tasks.train) * u64::from(spec.generate.trials_per_task), of: "episodes" }
+        Amount { count: u64::from(spec.tasks.train) * u64::from(spec.generate.trials_per_task), of: "episode" }
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
@@ -86,7 +87,9 @@ impl Worker for Converter<'_> {
         let made = Made {
             episodes,
             failed: failed_left_out + failed_included,
-            told: Some(format!("{episodes} episodes, {frames} frames, {calls} calls")),
+            told: Some(
+                [(episodes, "episode"), (frames, "frame"), (calls, "call")].map(|(n, of)| counted(n, of)).join(", "),
+            ),
             ..Made::files(&staged.dir, files.iter().map(String::as_str))?
         };
         staged.dir.write_plan(&job.plan)?;

@@ -16,6 +16,7 @@ use crate::seed::Seed;
 use crate::sim::{AdversaryConfig, SimError, Simulation, SimulationConfig};
 use crate::task::{self, Task, Trial};
 use crate::trace::{Actor, Episode, Provenance};
+use crate::words::counted;
 
 /// Raised when the same settings make other recordings.
 const VERSION: u32 = 1;
@@ -62,7 +63,7 @@ impl Unit for Demonstrated<'_> {
     }
 
     fn amount(&self, shard: u32) -> Amount {
-        Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
+        Amount { count: self.episodes(shard).len() as u64, of: "episode" }
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
@@ -84,7 +85,7 @@ impl Unit for Demonstrated<'_> {
     }
 
     fn told(&self, manifest: &Manifest) -> String {
-        format!("{} episodes, {} failed", manifest.episodes, manifest.failed)
+        format!("{}, {} failed", counted(manifest.episodes, "episode"), manifest.failed)
     }
 }
 

@@ -14,6 +14,7 @@ use crate::artifact::{ContractError, Plan, StageDir};
 use crate::pipeline::failures::Failure;
 use crate::pipeline::unit::{Unit, fresh_plan, plan};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Scope, Stage, runner};
+use crate::words::plural;
 
 /// A piece of work.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -31,7 +32,10 @@ pub struct Item {
     /// How much work it is, in what [`Item::counted`] says.
     pub amount: u64,
     /// What is counted: `episodes`, `steps`, `tasks`, `experiments`.
-    pub counted: &'static str,
+    pub counted: String,
+    /// One of them.
+    #[serde(skip)]
+    pub of: &'static str,
     /// What came of it.
     pub state: ItemState,
     /// How it failed the last time.
@@ -88,7 +92,8 @@ fn list(run: &RunDir, numbered: &Numbered<'_>, items: &mut Vec<Item>) -> Result<
             shard,
             shards: unit.shards(),
             amount: amount.count,
-            counted: amount.of,
+            counted: plural(amount.of),
+            of: amount.of,
             state: match (is_done, &failure) {
                 (true, _) => ItemState::Done,
                 (false, None) => ItemState::Left,

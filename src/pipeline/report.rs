@@ -71,7 +71,7 @@ impl Unit for Report<'_> {
     }
 
     fn amount(&self, _shard: u32) -> Amount {
-        Amount { count: self.experiments.len() as u64, of: "experiments" }
+        Amount { count: self.experiments.len() as u64, of: "experiment" }
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {

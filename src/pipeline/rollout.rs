@@ -128,7 +128,7 @@ impl Unit for Suite<'_> {
     }
 
     fn amount(&self, shard: u32) -> Amount {
-        Amount { count: self.episodes(shard).len() as u64, of: "episodes" }
+        Amount { count: self.episodes(shard).len() as u64, of: "episode" }
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {

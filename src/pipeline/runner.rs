@@ -14,6 +14,7 @@ use crate::pipeline::{
     upstream,
 };
 use crate::progress::Stopwatch;
+use crate::words::counted;
 
 /// Runs the chosen stages.
 ///
@@ -322,8 +323,7 @@ pub(super) fn why_needed(context: &Context<'_>, unit: &dyn Unit, plan: &Plan) ->
     if let Some(difference) = own.difference(plan) {
         return Ok(Some(match dir.count_receipts()? {
             0 => difference,
-            1 => format!("{difference}; its finished shard goes"),
-            receipts => format!("{difference}; its {receipts} finished shards go"),
+            receipts => format!("{difference}; it loses {}", counted(receipts, "finished shard")),
         }));
     }
     let Some(manifest) = dir.manifest()? else {

@@ -18,6 +18,7 @@ use crate::pipeline::runner::{finish, report_of, run_shard, why_needed};
 use crate::pipeline::unit::{Context, Job, Made, Unit, open};
 use crate::pipeline::{Options, Pipeline, PipelineError, RunDir, Scope, StageReport, Status};
 use crate::progress::{self, Stopwatch};
+use crate::words::counted;
 
 /// After which time it is looked again for what is missing, or held by another.
 const LOOK_AGAIN: Duration = Duration::from_millis(250);
@@ -78,10 +79,11 @@ fn begin(context: &Context<'_>, unit: &dyn Unit) -> Result<StageReport, Pipeline
     let reason = match difference {
         Some(None) if !force => return Ok(report_of(context, unit, Status::UpToDate, "up to date".to_owned())),
         Some(Some(difference)) if !force && receipts > 0 => {
-            let difference = format!("{difference}; --force begins anew and removes its {receipts} finished shards");
+            let difference =
+                format!("{difference}; --force begins anew and removes its {}", counted(receipts, "finished shard"));
             return Err(ContractError::OtherPlan { path: dir.path().to_owned(), difference }.into());
         }
-        Some(_) if receipts > 0 => format!("{receipts} finished shards were removed"),
+        Some(_) if receipts > 0 => format!("removed: {}", counted(receipts, "finished shard")),
         _ => "nothing was there".to_owned(),
     };
     if dry_run {
@@ -232,7 +234,7 @@ impl Items<'_> {
         };
         let worked = shards.to_vec().into_par_iter().map(run).collect();
         if unit.shards() > 1 {
-            job.progress.finish(&format!("{} of {} shards", job.done().len(), unit.shards()));
+            job.progress.finish(&format!("{} of {}", job.done().len(), counted(unit.shards(), "shard")));
         }
         worked
     }
@@ -298,7 +300,7 @@ fn commit_unit(context: &Context<'_>, numbered: &Numbered<'_>) -> Result<StageRe
         dir.missing(&plan)?.into_iter().map(|shard| numbered.numbers.start + u64::from(shard)).collect();
     if !missing.is_empty() {
         let items: ItemRanges = missing.iter().copied().collect();
-        let reason = format!("{} of {} items missing: {items}", missing.len(), unit.shards());
+        let reason = format!("{} of {} missing: {items}", missing.len(), counted(unit.shards(), "item"));
         return Ok(StageReport { missing, ..report_of(context, unit, Status::Missing, reason) });
     }
     if context.options.dry_run {

@@ -9,6 +9,7 @@ use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage};
 use crate::seed::Seed;
 use crate::task::{self, Split, Task, TaskSet};
+use crate::words::counted;
 
 /// Raised when the same settings draw other tasks.
 const VERSION: u32 = 1;
@@ -39,7 +40,7 @@ impl Unit for Tasks<'_> {
     }
 
     fn amount(&self, _shard: u32) -> Amount {
-        Amount { count: u64::from(self.0.spec.tasks.train) + u64::from(self.0.n_unseen()), of: "tasks" }
+        Amount { count: u64::from(self.0.spec.tasks.train) + u64::from(self.0.n_unseen()), of: "task" }
     }
 
     fn reads(&self, _run: &RunDir) -> Vec<StageDir> {
@@ -93,7 +94,12 @@ fn make(pipeline: &Pipeline) -> Result<TaskSet, PipelineError> {
             return Err(PipelineError::Value {
                 path: pipeline.path.clone(),
                 key: "tasks.unseen".to_owned(),
-                problem: format!("asks for {wanted} tasks in all, but {} holds {}", path.display(), tasks.tasks.len()),
+                problem: format!(
+                    "asks for {} in all, but {} holds {}",
+                    counted(wanted, "task"),
+                    path.display(),
+                    tasks.tasks.len()
+                ),
             });
         }
         tasks.tasks.truncate(wanted);

@@ -14,6 +14,7 @@ use crate::task::Split;
 use crate::training::{
     self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Place, Source, TrialStream,
 };
+use crate::words::counted;
 
 /// Boundary frames of a dataset above which trials are streamed from disk: those below take 700 MB at most.
 const MOST_FRAMES: u64 = 1_500_000;
@@ -122,7 +123,7 @@ impl Unit for Model<'_> {
 
     fn amount(&self, _shard: u32) -> Amount {
         let training = self.spec.training(self.seed).resolved();
-        Amount { count: u64::from(training.config.n_steps_in_all()), of: "steps" }
+        Amount { count: u64::from(training.config.n_steps_in_all()), of: "step" }
     }
 
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
@@ -235,7 +236,8 @@ impl Worker for Trainer<'_> {
             0 => String::new(),
             n => format!(", {n} gradients that were no numbers left out"),
         };
-        let told = Some(format!("{} steps, {} examples{dropped}", summary.steps, summary.examples));
+        let told =
+            Some(format!("{}, {}{dropped}", counted(summary.steps, "step"), counted(summary.examples, "example")));
         Ok(Some(Made { episodes: trials.len() as u64, told, ..made }))
     }
 }

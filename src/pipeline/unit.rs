@@ -70,7 +70,7 @@ pub(super) trait Unit: Send + Sync {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Amount {
     pub(super) count: u64,
-    /// What is counted, e.g. `episodes`.
+    /// What is counted, e.g. `episode`.
     pub(super) of: &'static str,
 }
 

@@ -13,6 +13,7 @@ use crate::robot::{Action, RobotApi as _};
 use crate::sim::Simulation;
 use crate::task;
 use crate::trace::Episode;
+use crate::words::counted;
 
 /// What the second simulation showed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -40,7 +41,7 @@ pub enum Verification {
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Same { frames } => write!(f, "simulated again: all {frames} frames are the same"),
+            Self::Same { frames } => write!(f, "simulated again: the same in {}", counted(*frames, "frame")),
             Self::Differs { frame, problem } => write!(f, "simulated again: frame {frame} differs: {problem}"),
             Self::Unknown { problem } => write!(f, "cannot be simulated again: {problem}"),
         }
@@ -91,7 +92,10 @@ fn compare(episode: &Episode, again: &[crate::trace::Frame]) -> Verification {
     }
     let (then, now) = (episode.frames.len(), again.len());
     if then != now {
-        return Verification::Differs { frame: then.min(now), problem: format!("there were {then} frames, now {now}") };
+        return Verification::Differs {
+            frame: then.min(now),
+            problem: format!("there were {then}, now {now}", then = counted(then, "frame")),
+        };
     }
     Verification::Same { frames: now }
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::publish::tables::TableFacts;
 use crate::publish::{Facts, Publication};
+use crate::words::counted;
 
 const TEMPLATE: &str = include_str!("card.md.j2");
 
@@ -51,6 +52,7 @@ pub(super) fn render(facts: &Facts, publication: &Publication) -> Result<Vec<u8>
     environment.set_lstrip_blocks(true);
     environment.set_keep_trailing_newline(true);
     environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
+    environment.add_filter("counted", |n: u64, thing: String| counted(n, &thing));
     let text = environment.render_named_str("card.md", TEMPLATE, card).map_err(|error| format!("{error:#}"))?;
     Ok(text.into_bytes())
 }

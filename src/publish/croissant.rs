@@ -11,6 +11,7 @@ use crate::artifact::FileEntry;
 use crate::publish::tables::{ColumnFacts, TableFacts};
 use crate::publish::{Facts, Publication};
 use crate::table::{ColumnKind, Form, Value as CellValue};
+use crate::words::counted;
 
 const CONTEXT: &str = include_str!("croissant_context.json");
 const PARQUET: &str = "application/x-parquet";
@@ -93,7 +94,7 @@ fn record_set(table: &TableFacts) -> Value {
         "@type": "cr:RecordSet",
         "@id": table.name,
         "name": table.name,
-        "description": format!("{} rows; each is {}.", table.rows, table.row),
+        "description": format!("{}; each is {}.", counted(table.rows, "row"), table.row),
         "key": key,
         "field": table.columns.iter().filter_map(|column| field(table, column)).collect::<Vec<_>>(),
     })

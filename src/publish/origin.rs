@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::annotate::{ANNOTATION, Measured};
 use crate::artifact::{IoError, read_json};
 use crate::dataset::DatasetSummary;
+use crate::words::counted;
 
 /// Where episodes and labels are from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -93,10 +94,10 @@ fn in_words(measured: &Measured) -> String {
     let subtasks = measured.levels.get("sub_task").cloned().unwrap_or_default();
     let f1 = subtasks.boundary_f1.get("0.5").copied().unwrap_or(0.0);
     format!(
-        "Measured against the true labels of `{}` ({} episodes): {} of the calls have the right program and frames; of the \
+        "Measured against the true labels of `{}` ({}): {} of the calls have the right program and frames; of the \
          sub-tasks {} of the frames are right, and the F1 of boundaries within 0.5 s is {f1:.3}.",
         measured.truth,
-        measured.episodes,
+        counted(measured.episodes, "episode"),
         percent(measured.call_accuracy()),
         percent(subtasks.frame_accuracy)
     )
@@ -142,13 +143,15 @@ impl Origin {
 
     /// One sentence or two on what the dataset is.
     pub(super) fn description(&self, summary: &DatasetSummary) -> String {
-        let DatasetSummary { total_episodes, total_tasks, .. } = summary;
+        let DatasetSummary { total_episodes, total_tasks, .. } = *summary;
+        let what = if *self == Self::Simulated { "simulated robot episode" } else { "robot episode" };
+        let (episodes, tasks) = (counted(total_episodes, what), counted(total_tasks, "task"));
         match self {
             Self::Simulated => {
                 let actors = summary.actors.iter().map(|(actor, episodes)| format!("{episodes} by {actor}"));
                 let families = summary.families.iter().map(|family| family.replace('_', " "));
                 format!(
-                    "{total_episodes} simulated robot episodes ({}) of {total_tasks} tasks of {}, with the hierarchy of \
+                    "{episodes} ({}) of {tasks} of {}, with the hierarchy of \
                      programs that acted them: true labels of every program call, its arguments, and the part of the \
                      demonstration it was given.",
                     actors.collect::<Vec<_>>().join(", "),
@@ -156,20 +159,18 @@ impl Origin {
                 )
             }
             Self::Annotated { column } => format!(
-                "{total_episodes} robot episodes of {total_tasks} tasks, with their annotated sub-tasks as a program tree \
+                "{episodes} of {tasks}, with their annotated sub-tasks as a program tree \
                  of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
             ),
             Self::Modelled(Modelled { models, .. }) => format!(
-                "{total_episodes} robot episodes of {total_tasks} tasks, taken apart by the model {models} into a \
+                "{episodes} of {tasks}, taken apart by the model {models} into a \
                  hierarchy of program calls with arguments, spans and confidences."
             ),
             Self::Foreign { .. } => {
                 let robot = summary.declared.as_ref().and_then(|declared| declared.robot_type.as_deref());
                 let robot = robot.map_or_else(String::new, |robot| format!(", robot type {robot:?}"));
                 let (frames, fps) = (summary.total_frames, summary.fps);
-                format!(
-                    "{total_episodes} robot episodes of {total_tasks} tasks: {frames} frames at {fps} a second{robot}."
-                )
+                format!("{episodes} of {tasks}: {frames} at {fps} a second{robot}.", frames = counted(frames, "frame"))
             }
         }
     }
@@ -243,7 +244,7 @@ impl Origin {
         match self {
             Self::Simulated => {
                 let share = 100.0 * successes as f64 / all.max(1) as f64;
-                format!("{successes} of {all} episodes succeeded ({share:.1} %).")
+                format!("{successes} of {all} succeeded ({share:.1} %).", all = counted(all, "episode"))
             }
             Self::Annotated { .. } | Self::Modelled(_) => {
                 "Demonstrations are taken for successes: nobody has judged them.".to_owned()
@@ -259,24 +260,24 @@ impl Origin {
                 "Simulated: rigid bodies, a gripper without an arm, known poses. Nothing of it was measured on a robot."
                     .to_owned(),
                 format!(
-                    "`timestamp` is regular at {fps} frames a second, as LeRobot wants; the simulation's own time is \
-                     `ntp.time_secs`."
-                ),
+                    "`timestamp` is regular at {fps} a second, as LeRobot wants; the simulation's own time is \
+                     `ntp.time_secs`.", fps = counted(fps, "frame")),
                 "Observations are positions of slots, relative to the gripper.".to_owned(),
             ],
             Self::Annotated { .. } => vec![
                 "The accuracy of the labels was not measured.".to_owned(),
                 "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
-                format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
+                format!("`timestamp` is regular at {fps} a second, as LeRobot wants.", fps = counted(fps, "frame")),
             ],
             Self::Modelled(Modelled { measured, .. }) => vec![
                 format!("The labels are a model's. {measured}"),
-                format!("`timestamp` is regular at {fps} frames a second, as LeRobot wants."),
+                format!("`timestamp` is regular at {fps} a second, as LeRobot wants.", fps = counted(fps, "frame")),
                 "Observations are positions of slots, relative to the gripper.".to_owned(),
             ],
             Self::Foreign { .. } => vec![
                 format!(
-                    "`timestamp` is regular at {fps} frames a second, as LeRobot wants: when a sensor was read is not told."
+                    "`timestamp` is regular at {fps} a second, as LeRobot wants: when a sensor was read is not told.",
+                    fps = counted(fps, "frame")
                 ),
                 "What its columns mean is told by their names alone.".to_owned(),
             ],
@@ -285,8 +286,10 @@ impl Origin {
             "Frames between the ends of primitives are not in the tables: motions have no intermediate states.";
         let unseen = "It has no episode of an unseen task: how well a learner generalizes shows elsewhere.";
         let left_out = summary.failed_left_out;
-        let left_out_words =
-            format!("{left_out} episodes that failed were left out: what is here is better than what acted.");
+        let left_out_words = format!(
+            "{left_out} that failed were left out: what is here is better than what acted.",
+            left_out = counted(left_out, "episode")
+        );
         let is_simulated = *self == Self::Simulated;
         let further = [
             (summary.frames == "boundaries", boundaries.to_owned()),

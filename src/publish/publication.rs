@@ -64,7 +64,10 @@ impl Publication {
     /// `owner/name` of an address at the Hugging Face hub.
     pub(super) fn repository(&self) -> Option<&str> {
         let rest = self.url.as_deref()?.strip_prefix("https://huggingface.co/datasets/")?.trim_end_matches('/');
-        (rest.split('/').count() == 2).then_some(rest)
+        let is_name = |part: &str| {
+            !part.is_empty() && part.chars().all(|letter| letter.is_ascii_alphanumeric() || "._-".contains(letter))
+        };
+        (rest.split('/').count() == 2 && rest.split('/').all(is_name)).then_some(rest)
     }
 
     /// The name as a folder, a pipeline and a citation can have it.

@@ -4,8 +4,8 @@
 # LeRobot opens a dataset on the hub only when the repository has a tag that names the format's version.
 # With git alone: git init, git lfs install, git add, git commit, git tag v3.0, git push ORIGIN main v3.0
 set -eu
-repository=$1
-cd "$(dirname "$0")"
+repository=${1:?"the repository is missing: sh upload.sh OWNER/NAME"}
+cd -- "$(dirname -- "$0")"
 version=$(sed -n 's/.*"codebase_version": *"\([^"]*\)".*/\1/p' meta/info.json)
 if command -v sha256sum > /dev/null; then sha256sum --quiet -c SHA256SUMS; fi
 hf upload "$repository" . . --repo-type dataset

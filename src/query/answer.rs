@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::artifact::AtomicFile;
 use crate::query::QueryError;
+use crate::words::counted;
 
 /// Between columns of the text form.
 const GAP: &str = "  ";
@@ -43,8 +44,7 @@ impl Answer {
         };
         let mut lines: Vec<String> = (0..=self.n_rows()).map(line).collect();
         lines.insert(1, widths.iter().map(|&width| "-".repeat(width)).collect::<Vec<_>>().join(GAP));
-        let rows = if self.n_rows() == 1 { "row" } else { "rows" };
-        lines.push(format!("{} {rows}", self.n_rows()));
+        lines.push(counted(self.n_rows(), "row"));
         lines.join("\n")
     }
 

@@ -1,6 +1,7 @@
 //! What a robot did that the protocol does not allow.
 
 use crate::remote::wire::MAX_LINE_BYTES;
+use crate::words::counted;
 
 /// A robot that cannot be acted with any longer, and why.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -30,7 +31,7 @@ pub enum RemoteProblem {
     Part { part: &'static str, problem: String },
     #[error("it speaks protocol {found}; allowed: {expected}")]
     Protocol { found: u32, expected: u32 },
-    #[error("it reports more than {most} frames in one action")]
+    #[error("it reports more than {most} in one action", most = counted(*most, "frame"))]
     TooManyFrames { most: usize },
     #[error("its time goes from {before} ns to {now} ns; time must grow")]
     Time { before: u64, now: u64 },

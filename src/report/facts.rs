@@ -8,6 +8,7 @@ use crate::report::ReportError;
 use crate::report::frames::Rows;
 use crate::robot::RobotKind;
 use crate::task::Split;
+use crate::words::counted;
 
 /// The families of the paper's experiments, as files name them.
 pub(super) const BLOCK_STACKING: &str = "block_stacking";
@@ -183,8 +184,8 @@ impl SuiteFacts {
         let Some(family) = &self.family else { return String::new() };
         let mut words = vec![capitalized(family)];
         words.extend(self.blocks.map(|blocks| format!("{blocks} blocks")));
-        words.extend(self.bowls.map(|bowls| plural(bowls, "bowl")));
-        words.extend(self.objects().filter(|_| self.blocks.is_none()).map(|objects| plural(objects, "object")));
+        words.extend(self.bowls.map(|bowls| counted(bowls, "bowl")));
+        words.extend(self.objects().filter(|_| self.blocks.is_none()).map(|objects| counted(objects, "object")));
         words.extend(self.split.as_ref().map(|split| format!("{split} tasks")));
         words.extend((self.order.as_deref() == Some("shuffled")).then(|| "towers in another order".to_owned()));
         let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
@@ -217,8 +218,4 @@ fn capitalized(name: &str) -> String {
         letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect::<String>()
     };
     name.split('_').map(word).collect::<Vec<_>>().join(" ")
-}
-
-fn plural(count: i64, word: &str) -> String {
-    format!("{count} {word}{}", if count == 1 { "" } else { "s" })
 }

@@ -7,12 +7,13 @@ use minijinja::{Environment, UndefinedBehavior, Value};
 use serde::Serialize;
 
 use crate::report::chart::distinct;
-use crate::report::chart::scale::plural;
+use crate::report::chart::scale::many;
 use crate::report::markdown;
 use crate::report::metrics::Curve;
 use crate::report::order;
 use crate::report::section::{Contents, SECTIONS};
 use crate::report::summary::Report;
+use crate::words::counted;
 
 /// What the page's own template is filled in with.
 #[derive(Serialize)]
@@ -32,6 +33,7 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.set_trim_blocks(true);
     environment.set_lstrip_blocks(true);
+    environment.add_filter("counted", |n: u64, thing: String| counted(n, &thing));
     environment.add_template("charts.html.j2", include_str!("charts.html.j2"))?;
     environment.add_template("page.html.j2", include_str!("page.html.j2"))?;
     let experiments = distinct(report.aggregates.iter().map(|row| &row.actor.experiment));
@@ -59,9 +61,9 @@ fn lede(report: &Report) -> Vec<String> {
     let variants = distinct(report.aggregates.iter().map(|row| &row.actor.variant)).len() as u64;
     let suites = distinct(report.aggregates.iter().map(|row| &row.suite)).len() as u64;
     vec![
-        plural(episodes, "rollout", "rollouts"),
-        plural(suites, "suite", "suites"),
-        plural(variants, "variant", "variants"),
-        plural(seeds.len() as u64, "training seed", "training seeds"),
+        many(episodes, "rollout"),
+        many(suites, "suite"),
+        many(variants, "variant"),
+        many(seeds.len() as u64, "training seed"),
     ]
 }

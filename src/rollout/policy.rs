@@ -6,6 +6,7 @@ use crate::model::{PictureIndex, Pictures, ReadError, ScopingKind, Specification
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{Episode, Observation, ObservationRows, Prediction, Span, SpecificationForm, instructions};
+use crate::words::counted;
 
 /// A task specification as a policy sees it: a demonstration's boundary observations, or its instructions.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,7 +124,7 @@ pub enum PolicyError {
         problem: ReadError,
     },
     /// The policy answered another number of queries than it was asked.
-    #[error("policy {policy} made {found} decisions; asked for were {expected}")]
+    #[error("policy {policy} made {found}; asked for were {expected}", found = counted(*found, "decision"))]
     Count {
         /// The variant's name.
         policy: String,

@@ -1,5 +1,7 @@
 //! Why a simulation cannot begin.
 
+use crate::words::counted;
+
 /// A scene, a start or a setting that the simulation refuses. Bodies are named as in the scene.
 #[expect(missing_docs, reason = "the messages say what each field is")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -8,7 +10,7 @@ pub enum SimError {
     Config { key: &'static str, found: String, allowed: String },
     #[error("adversary.{key} is {found}; allowed: {allowed}")]
     Adversary { key: &'static str, found: f32, allowed: &'static str },
-    #[error("{found} body poses, but the scene has {expected} bodies")]
+    #[error("{found} body poses, but the scene has {expected}", expected = counted(*expected, "body"))]
     BodyCount { found: usize, expected: usize },
     #[error("{name}: every size must be a finite number above 0")]
     Size { name: String },

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use parquet::errors::ParquetError;
 
 use crate::artifact::IoError;
+use crate::words::counted;
 
 /// A table that could not be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +66,7 @@ pub enum TableError {
         found: String,
     },
     /// Columns to be written differ in length.
-    #[error("{}: column {column:?} has {found} rows, but the others have {expected}", path.display())]
+    #[error("{}: column {column:?} has {found}, but the others have {expected}", path.display(), found = counted(*found, "row"))]
     RowCount {
         /// Which file.
         path: PathBuf,

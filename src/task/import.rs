@@ -19,6 +19,7 @@ use serde_json::Value;
 use crate::artifact::{self, IoError};
 use crate::scene::SlotIndex;
 use crate::task::{Condition, Family, Goal, Split, Task, TaskSet, TaskSetError};
+use crate::words::counted;
 
 /// A task file of the authors' that cannot be taken.
 #[derive(Debug, thiserror::Error)]
@@ -37,7 +38,7 @@ pub enum ImportError {
         problem: ImportProblem,
     },
     /// The split asks for more tasks than there are.
-    #[error("the split asks for {asked} training tasks, the file has {found} tasks: {}", path.display())]
+    #[error("the split asks for {asked} training tasks, the file has {found}: {}", path.display(), found = counted(*found, "task"))]
     TooFewTasks {
         /// Which file.
         path: PathBuf,

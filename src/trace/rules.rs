@@ -4,6 +4,7 @@ use crate::geometry::Pose;
 use crate::program::Program;
 use crate::scene::{BodyIndex, Scene, SlotIndex};
 use crate::trace::{CallId, Frame, Outcome, ProgramCall, Push, Span};
+use crate::words::counted;
 
 /// A rule of the trace that does not hold. `call` and `frame` count from 0.
 #[expect(missing_docs, reason = "the messages say what each field is")]
@@ -15,9 +16,9 @@ pub enum TraceError {
     FirstFrameInside,
     #[error("frame {frame}: its time is not after the frame before")]
     TimeNotIncreasing { frame: usize },
-    #[error("frame {frame}: {found} body poses, but the scene has {expected} bodies")]
+    #[error("frame {frame}: {found} body poses, but the scene has {expected}", expected = counted(*expected, "body"))]
     BodyCount { frame: usize, found: usize, expected: usize },
-    #[error("frame {frame}: {found} slots, but the scene has {expected}")]
+    #[error("frame {frame}: {found}, but the scene has {expected}", found = counted(*found, "slot"))]
     SlotCount { frame: usize, found: usize, expected: usize },
     #[error("frame {frame}: slot {slot} shows body {body}, which is not one of the slot's bodies")]
     ForeignBody { frame: usize, slot: usize, body: u16 },
@@ -25,9 +26,9 @@ pub enum TraceError {
     NotFinite { frame: usize },
     #[error("frame {frame}: it tells joints and the first frame does not, or the other way round")]
     Joints { frame: usize },
-    #[error("frame {frame}: body {body} is held, but the scene has {bodies} bodies")]
+    #[error("frame {frame}: body {body} is held, but the scene has {bodies}", bodies = counted(*bodies, "body"))]
     HeldBody { frame: usize, body: u16, bodies: usize },
-    #[error("slot {slot} may show body {body}, but the scene has {bodies} bodies")]
+    #[error("slot {slot} may show body {body}, but the scene has {bodies}", bodies = counted(*bodies, "body"))]
     SlotBody { slot: usize, body: u16, bodies: usize },
     #[error("the episode has no calls")]
     NoCalls,
@@ -49,7 +50,7 @@ pub enum PushProblem {
     OffBoundary { frame: u32 },
     #[error("it begins at frame {begin}, before the push before has come to rest at frame {before}")]
     Overlap { begin: u32, before: u32 },
-    #[error("it is of body {body}, but the scene has {bodies} bodies")]
+    #[error("it is of body {body}, but the scene has {bodies}", bodies = counted(*bodies, "body"))]
     Body { body: u16, bodies: usize },
     #[error("its impulse is not finite")]
     NotFinite,
@@ -71,7 +72,7 @@ pub enum CallProblem {
     CallerIsLeaf { caller: Program },
     #[error("its depth is {found}, but its caller's is {caller}")]
     Depth { found: u8, caller: u8 },
-    #[error("it is step {found} of its caller, but {expected} calls came before")]
+    #[error("it is step {found} of its caller, but {expected} came before", expected = counted(*expected, "call"))]
     Step { found: u16, expected: u16 },
     #[error("its caller had already ended")]
     AfterEnd,

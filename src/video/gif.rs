@@ -7,6 +7,7 @@ use color_quant::NeuQuant;
 use gif::{Encoder, Frame, Repeat};
 
 use crate::video::{Rgb, VideoError};
+use crate::words::counted;
 
 /// How carefully 256 colours are chosen: 1 to 30, where 1 is best and slowest.
 const SPEED: i32 = 10;
@@ -64,7 +65,7 @@ fn check(picture: &Rgb, size_px: [u32; 2]) -> Result<(), VideoError> {
     if picture.bytes.len() == n_bytes && n_bytes > 0 {
         return Ok(());
     }
-    let message = format!("{} bytes for {}x{} pixels", picture.bytes.len(), size_px[0], size_px[1]);
+    let message = format!("{} for {}x{} pixels", counted(picture.bytes.len(), "byte"), size_px[0], size_px[1]);
     Err(VideoError::codec("encode", "GIF")(&message))
 }
 

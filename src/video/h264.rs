@@ -7,6 +7,7 @@ use openh264::encoder::{BitRate, Encoder, EncoderConfig, FrameRate, IntraFramePe
 use openh264::formats::{RgbSliceU8, YUVBuffer, YUVSource as _};
 
 use crate::video::{Rgb, VideoError};
+use crate::words::counted;
 
 /// The steps of quantisation that the encoder may choose from: small, so that letters stay sharp.
 const QUANTISATION: [u8; 2] = [16, 24];
@@ -58,7 +59,7 @@ impl H264Encoder {
         let failed = VideoError::codec("encode", "H.264");
         let [width, height] = self.size_px.map(|side| side as usize);
         if rgb.len() != 3 * width * height || width % 2 + height % 2 > 0 {
-            return Err(failed(&format!("{} bytes for {width}x{height} pixels", rgb.len())));
+            return Err(failed(&format!("{} for {width}x{height} pixels", counted(rgb.len(), "byte"))));
         }
         self.yuv.read_rgb8(RgbSliceU8::new(rgb, (width, height)));
         if is_key && self.n_encoded > 0 {

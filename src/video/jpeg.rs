@@ -4,6 +4,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::video::{Rgb, VideoError};
+use crate::words::counted;
 
 /// From 1 to 100. At 82 no blocks show in flat colours.
 const QUALITY: u8 = 82;
@@ -17,7 +18,7 @@ pub fn encode_jpeg(picture: &Rgb) -> Result<Vec<u8>, VideoError> {
     let failed = VideoError::codec("encode", "JPEG");
     let [width, height] = picture.size_px;
     if picture.bytes.len() as u64 != 3 * u64::from(width) * u64::from(height) {
-        return Err(failed(&format!("{} bytes for {width}x{height} pixels", picture.bytes.len())));
+        return Err(failed(&format!("{} for {width}x{height} pixels", counted(picture.bytes.len(), "byte"))));
     }
     let mut jpeg = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut jpeg, QUALITY);

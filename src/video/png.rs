@@ -4,6 +4,7 @@ use image::codecs::png::{CompressionType, FilterType, PngDecoder, PngEncoder};
 use image::{ColorType, ExtendedColorType, ImageDecoder as _, ImageEncoder as _};
 
 use crate::video::VideoError;
+use crate::words::counted;
 
 /// A picture: red, green, blue of each pixel, `[height, width, 3]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -32,7 +33,7 @@ const MAX_SIDE_PX: u32 = 1 << 14;
 /// When the bytes are not as many as the size says.
 pub fn encode_png(rgb: &[u8], [width, height]: [u32; 2], png: &mut Vec<u8>) -> Result<(), VideoError> {
     if rgb.len() != width as usize * height as usize * 3 {
-        let message = format!("{} bytes for {width}x{height} pixels", rgb.len());
+        let message = format!("{} for {width}x{height} pixels", counted(rgb.len(), "byte"));
         return Err(VideoError::codec("encode", "PNG")(&message));
     }
     let encoder = PngEncoder::new_with_quality(png, CompressionType::Fast, FilterType::Up);
@@ -63,7 +64,7 @@ fn encode_grey(bytes: &[u8], [width, height]: [u32; 2], color: ExtendedColorType
     let failed = VideoError::codec("encode", "PNG");
     let expected = u64::from(width) * u64::from(height) * u64::from(color.bits_per_pixel() / 8);
     if bytes.len() as u64 != expected {
-        return Err(failed(&format!("{} bytes for {width}x{height} pixels of {color:?}", bytes.len())));
+        return Err(failed(&format!("{} for {width}x{height} pixels of {color:?}", counted(bytes.len(), "byte"))));
     }
     let mut png = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Up);

@@ -15,6 +15,7 @@ use crate::dataset::{CallFacts, CameraTrack, NumberTrack, Playback, TrackPicture
 use crate::visualize::layout::{Layout, Node};
 use crate::visualize::store::Store;
 use crate::visualize::{VisualizeError, VisualizeSummary, clock, lanes, palette};
+use crate::words::counted;
 
 /// What is left of the colour of every other call, so that neighbours can be told apart.
 const ODD_SHADE: f32 = 0.82;
@@ -109,11 +110,21 @@ fn markdown(playback: &Playback) -> String {
     let episode = facts.episode_index;
     if facts.outcome.is_empty() {
         let split = if facts.split.is_empty() { String::new() } else { format!("split `{}`, ", facts.split) };
-        return format!("# {}\n\n{split}episode {episode}: {n_frames} frames, {duration:.1} s\n", facts.task_text);
+        return format!(
+            "# {}\n\n{split}episode {episode}: {n_frames}, {duration:.1} s\n",
+            facts.task_text,
+            n_frames = counted(n_frames, "frame")
+        );
     }
     format!(
-        "# {}\n\n{}\n\n**{}**, by `{}`, `{}` task\n\nepisode {episode}: {n_frames} frames, {n_calls} calls, {duration:.1} s\n",
-        facts.task_id, facts.task_text, facts.outcome, facts.actor, facts.split
+        "# {}\n\n{}\n\n**{}**, by `{}`, `{}` task\n\nepisode {episode}: {n_frames}, {n_calls}, {duration:.1} s\n",
+        facts.task_id,
+        facts.task_text,
+        facts.outcome,
+        facts.actor,
+        facts.split,
+        n_frames = counted(n_frames, "frame"),
+        n_calls = counted(n_calls, "call")
     )
 }
 

@@ -12,6 +12,7 @@ use crate::rollout::Divergence;
 use crate::trace::{Episode, Outcome};
 use crate::visualize::store::Store;
 use crate::visualize::{Replay, VisualizeError, agreement, recording_name};
+use crate::words::counted;
 
 /// The id of a recording: readable, and other for other content.
 pub(super) fn recording_id(replay: &Replay<'_>) -> String {
@@ -85,10 +86,7 @@ fn facts(replay: &Replay<'_>) -> Vec<(&'static str, String)> {
 /// `2 pushes, 3 bodies toppled`; nothing without a push.
 fn pushes_in_words(episode: &Episode) -> Option<String> {
     let n_toppled: usize = episode.pushes.iter().map(|push| push.toppled.len()).sum();
-    let plural = |count: usize, one: &str, several: &str| format!("{count} {}", if count == 1 { one } else { several });
-    let told = || {
-        format!("{}, {} toppled", plural(episode.pushes.len(), "push", "pushes"), plural(n_toppled, "body", "bodies"))
-    };
+    let told = || format!("{}, {} toppled", counted(episode.pushes.len(), "push"), counted(n_toppled, "body"));
     (!episode.pushes.is_empty()).then(told)
 }
 
@@ -113,13 +111,13 @@ fn markdown(replay: &Replay<'_>) -> String {
     }
     let _written = write!(
         page,
-        "\n`{}` task, trial {} of seed `{}`, episode {}\n\n{} frames, {} calls, {:.1} s\n",
+        "\n`{}` task, trial {} of seed `{}`, episode {}\n\n{}, {}, {:.1} s\n",
         provenance.split.name(),
         provenance.trial,
         provenance.seed,
         provenance.index,
-        episode.frames.len(),
-        episode.calls.len(),
+        counted(episode.frames.len(), "frame"),
+        counted(episode.calls.len(), "call"),
         duration_secs(episode)
     );
     if let Some(words) = pushes_in_words(episode) {

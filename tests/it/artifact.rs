@@ -179,7 +179,7 @@ fn plans_differ_by_stage_version_inputs_and_settings_but_not_by_release() {
     let difference = |new: Plan| old.difference(&new).unwrap();
     assert_eq!(difference(old.clone().of_stage_version(2)), "made by version 1 of generate, this is 2");
     assert_eq!(difference(plan(1, 2)), "its setting setting changed");
-    assert_eq!(difference(plan(2, 1)), "it had 1 shards, now there are 2");
+    assert_eq!(difference(plan(2, 1)), "it had 1 shard, now it has 2");
     let inputs = BTreeMap::from([("tasks".to_owned(), "abc".to_owned())]);
     assert_eq!(difference(Plan { inputs, ..old.clone() }), "its input tasks changed");
 }

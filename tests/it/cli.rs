@@ -1,5 +1,7 @@
 //! The process boundary: streams, exit codes, help.
 
+use std::path::Path;
+
 use assert_cmd::Command;
 
 use crate::smoke;
@@ -75,6 +77,128 @@ fn replay_without_a_purpose_says_what_to_choose() {
         ntp().arg("replay").arg(out.join("recordings")).args(["--episode", "99", "--verify"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stderr).unwrap().contains("no episode 99 among the 9"));
+}
+
+/// Exit code and what was said on stderr.
+fn said(command: &mut Command) -> (Option<i32>, String) {
+    let output = command.output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn episodes_are_named_alike_by_every_command() {
+    let out = smoke::whole();
+    let recordings = out.join("recordings");
+    let verified = |option: &str, ranges: &str| {
+        let output = ntp().arg("replay").arg(&recordings).args([option, ranges, "--verify"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let lines = String::from_utf8(output.stdout).unwrap();
+        lines.lines().map(|line| line.split(' ').nth(1).unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(verified("--episode", "2-4,0"), ["2", "3", "4", "0"]);
+    assert_eq!(verified("--episodes", "8"), ["8"]);
+    let (code, text) = said(ntp().arg("replay").arg(&recordings).args(["--episode", "7-9", "--verify"]));
+    assert!(code == Some(1) && text.contains("no episode 9 among the 9"), "{text}");
+    let (code, text) = said(ntp().arg("replay").arg(&recordings).args(["--episode", "4-2", "--verify"]));
+    assert!(code == Some(2) && text.contains("\"4-2\" is no range of episodes such as 0-9, or 12"), "{text}");
+    let (code, text) = said(ntp().arg("render").arg(&recordings).args(["--episode", "0-3", "--png", "x.png"]));
+    assert!(code == Some(2) && text.contains("\"0-3\" is not the number of one episode, such as 3"), "{text}");
+    let folder = tempfile::tempdir().unwrap();
+    let filter = ntp()
+        .args(["dataset", "filter", "--episode", "1-2"])
+        .arg(out.join("dataset"))
+        .arg("--to")
+        .arg(folder.path().join("two"))
+        .output()
+        .unwrap();
+    let told = String::from_utf8(filter.stdout).unwrap();
+    assert!(told.contains("two: 2 episodes, 7 left out, "), "{told}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_stdout_is_told() {
+    let out = smoke::whole();
+    for arguments in
+        [&["query", "dataset", "SELECT program FROM calls"][..], &["inspect", "dataset"], &["completions", "bash"]]
+    {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_ntp"));
+        let output = command.args(arguments).current_dir(out).stdout(full).output().unwrap();
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert_eq!(text, "ntp: failed to write to stdout: No space left on device (os error 28)\n");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_takes_the_place_of_a_file_alone_and_of_none_that_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run");
+    smoke::copy_folder(smoke::whole(), &run);
+    let path = |name: &str| folder.path().join(name);
+    let query = |to: &Path| {
+        said(ntp().arg("query").arg(run.join("dataset")).args(["SELECT program FROM calls", "--parquet"]).arg(to))
+    };
+    // A link, so that a fault costs a link and not the device.
+    std::os::unix::fs::symlink("/dev/null", path("null")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(path("pipe")).status().unwrap().success());
+    std::fs::create_dir(path("taken")).unwrap();
+    for (name, found) in [("null", "a device"), ("pipe", "a pipe"), ("taken", "a folder")] {
+        let (code, text) = query(&path(name));
+        let told =
+            format!("cannot write {}: it is {found}; allowed: a new name, or the name of a file", path(name).display());
+        assert!(code == Some(1) && text.contains(&told), "{text}");
+        assert!(std::fs::metadata(path(name)).unwrap().file_type() != std::fs::metadata(file!()).unwrap().file_type());
+    }
+    assert!(path("null").is_symlink());
+    // What has the name of a result goes, behind a link too, and the link stays.
+    std::fs::write(path("old"), "old").unwrap();
+    std::os::unix::fs::symlink(path("old"), path("link")).unwrap();
+    assert_eq!(query(&path("link")).0, Some(0));
+    assert!(path("link").is_symlink() && std::fs::read(path("old")).unwrap().starts_with(b"PAR1"));
+    let frames = run.join("dataset/data/chunk-000/file-000.parquet");
+    let before = std::fs::read(&frames).unwrap();
+    let (code, text) = query(&frames);
+    assert!(code == Some(2) && text.contains("is read; choose another name"), "{text}");
+    assert!(std::fs::read(&frames).unwrap() == before);
+    let recordings = run.join("recordings");
+    let shard = recordings.join("shard-00000-of-00003.mcap");
+    for (command, option) in [("render", "--png"), ("render", "--mp4"), ("render", "--gif"), ("replay", "--save")] {
+        let arguments = ["--episode", "0", option];
+        let (code, text) = said(ntp().arg(command).arg(&recordings).args(arguments).arg(&shard));
+        assert!(code == Some(2) && text.contains(&format!("{option} {}", shard.display())), "{text}");
+    }
+    let (code, text) = said(
+        ntp().args(["dataset", "filter", "--min-frames", "1"]).arg(run.join("dataset")).arg("--to").arg(path("old")),
+    );
+    assert!(code == Some(1) && text.contains("only a new or empty folder is written, but"), "{text}");
+    assert!(text.contains("is no folder"), "{text}");
+}
+
+#[test]
+fn a_stage_by_itself_says_what_it_reads_that_is_stale() {
+    let folder = smoke::copy_to("report");
+    let pipeline = folder.path().join("changed pipeline.toml");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(smoke::PIPELINE)).unwrap();
+    let report = |text: &str| {
+        std::fs::write(&pipeline, text).unwrap();
+        said(ntp().arg("report").arg(&pipeline).arg("--out").arg(folder.path()))
+    };
+    let (code, told) = report(&text);
+    assert!(code == Some(0) && told.contains("report: up to date") && !told.contains("stale"), "{told}");
+    let changed = text.replacen("trials_per_task = ", "trials_per_task = 1", 1);
+    assert_ne!(changed, text);
+    let (code, told) = report(&changed);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("stale: generate: its setting episodes changed\n"), "{told}");
+    let again = format!(
+        "report takes it as it is; ntp run '{}' --out {} makes it anew",
+        pipeline.display(),
+        folder.path().display()
+    );
+    assert!(told.contains(&again), "{told}");
 }
 
 #[test]

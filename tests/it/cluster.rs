@@ -170,7 +170,7 @@ fn items_of_another_plan_are_refused_by_name_and_change_nothing() {
         assert_eq!(hashes(folder.path(), &ALL), before, "{more:?}");
     }
     let (code, stdout, stderr) = run(&["generate", &pipeline, "--out", out.as_ref(), "--begin", "--force"]);
-    assert!(code == 0 && stdout.contains("3 finished shards were removed"), "{stdout} {stderr}");
+    assert!(code == 0 && stdout.contains("removed: 3 finished shards"), "{stdout} {stderr}");
     assert_eq!(run(&["generate", &pipeline, "--out", out.as_ref(), "--items", "0-1"]).0, 0);
     assert_eq!(run(&["generate", &pipeline, "--out", out.as_ref(), "--commit"]).0, 0);
 }
@@ -275,7 +275,7 @@ fn a_failing_item_is_named_and_keeps_no_other_from_being_done() {
     std::fs::create_dir_all(&poison).unwrap();
     let (code, stdout, stderr) = stage("generate", folder.path(), &["--items", "0-2"]);
     assert_eq!(code, 1);
-    assert!(stderr.contains("generate: 1 items failed: 1"), "{stderr}");
+    assert!(stderr.contains("generate: 1 item failed: 1"), "{stderr}");
     assert!(stdout.contains("shard 1 of 3  failed") && stdout.contains("shard-00001-of-00003.mcap"), "{stdout}");
     let failed = json("items", folder.path(), &["--stage", "generate", "--left"]);
     assert_eq!((failed.as_array().unwrap().len(), &failed[0]["state"]), (1, &"failed".into()));
@@ -352,14 +352,14 @@ fn a_submitted_run_ends_as_a_run_and_submitting_again_does_what_is_left() {
     let (code, stdout, stderr) = run(&["status", &path]);
     assert_eq!(code, 3, "{stderr}");
     assert!(stdout.contains("generate: 2 of 3 items done, 1 failed"), "{stdout}");
-    assert!(stdout.contains("item 1 of generate failed 1 times") && stdout.contains("logs/generate-1.log"), "{stdout}");
-    assert!(stdout.contains("train: 0 of 1 items done, 1 left: 0"), "{stdout}");
+    assert!(stdout.contains("item 1 of generate failed 1 time") && stdout.contains("logs/generate-1.log"), "{stdout}");
+    assert!(stdout.contains("train: 0 of 1 item done, 1 left: 0"), "{stdout}");
     std::fs::remove_dir_all(out.join("recordings/shard-00001-of-00003.mcap")).unwrap();
     let (code, stdout, stderr) = submit(&[]);
-    assert!(code == 0 && stdout.contains("generate: 1 items left, in 1 tasks"), "{stdout} {stderr}");
+    assert!(code == 0 && stdout.contains("generate: 1 item left, in 1 task"), "{stdout} {stderr}");
     assert_eq!(hashes(&out, &ALL), hashes(smoke::whole(), &ALL));
     let (code, stdout, _) = run(&["status", &path]);
-    assert!(code == 0 && stdout.contains("report: 1 of 1 items done"), "{stdout}");
+    assert!(code == 0 && stdout.contains("report: 1 of 1 item done"), "{stdout}");
     let (code, stdout, _) = submit(&[]);
     assert!(code == 0 && stdout.contains("nothing is left to do"), "{stdout}");
     let other = changed(folder.path(), "steps = 6", "steps = 7");

@@ -290,3 +290,22 @@ fn the_card_of_a_dataset_that_was_annotated_elsewhere_claims_nothing_of_it() {
         assert!(card.contains(told), "{told}: {card}");
     }
 }
+
+#[test]
+fn what_was_brought_in_has_the_name_of_its_folder_and_paths_are_quoted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [theirs, dataset, to] = ["theirs", "tea & cups", "Ada's copy"].map(|name| folder.path().join(name));
+    crate::import::theirs(&theirs);
+    ntp::dataset::import::import(&theirs, None, &dataset).unwrap();
+    let words = [&dataset, &to].map(|path| path.to_string_lossy().into_owned());
+    let arguments = ["--license", "mit", "--date", "2026-11-30"];
+    let (code, _, stderr) = run(&[&["publish", &words[0], "--to", &words[1]], &arguments[..]].concat());
+    assert!(code == 0 || code == 3, "{stderr}");
+    let card = std::fs::read_to_string(to.join("README.md")).unwrap();
+    assert!(card.contains("pretty_name: \"tea & cups\"\n") && card.contains("\n# tea & cups\n"), "{card}");
+    let script = words[1].replace('\'', "'\\''");
+    assert!(stderr.contains(&format!("sh '{script}/upload.sh' OWNER/NAME")), "{stderr}");
+    // Without the hub's client the script gets no further than its arguments.
+    let told = std::process::Command::new("sh").arg(to.join("upload.sh")).output().unwrap();
+    assert!(String::from_utf8_lossy(&told.stderr).contains("the repository is missing: sh upload.sh OWNER/NAME"));
+}

@@ -661,7 +661,7 @@ fn the_page_shows_every_part() {
         "8 rollouts",
         "paper 86.3 %<b>+3.7 pts</b>",
         "ended early: 1 of 8 rollouts, 12.5 %",
-        "<code>ntp</code> 1 of 1 failures; 1 recovered",
+        "<code>ntp</code> 1 of 1 failure; 1 recovered",
         "decision 17: scope, 1 rollouts",
         "ntp, 100 tasks, training seed 0: 0.1267 in the end",
         "<dt>training tasks</dt><dd>100</dd>",
@@ -1018,4 +1018,25 @@ fn what_models_that_see_are_given_is_said_of_those_that_are_there() {
         }
         assert!(!text.contains("VGG16"));
     }
+}
+
+#[test]
+fn every_table_of_the_page_scrolls_in_a_box_of_its_own() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/report");
+    let mut n_tables = 0;
+    for folder in [root.clone(), root.join("section")] {
+        let templates = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        for path in templates.filter(|path| path.extension().is_some_and(|extension| extension == "j2")) {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+            for (at, _) in lines.iter().enumerate().filter(|(_, line)| line.starts_with("<table")) {
+                let before = lines[at - 1];
+                let boxes =
+                    ["<div class=\"card scroll\">", "<div class=\"card scroll next\">", "<div class=\"scrolled\">"];
+                assert!(boxes.contains(&before), "{}: {before}", path.display());
+                n_tables += 1;
+            }
+        }
+    }
+    assert!(n_tables > 12, "{n_tables}");
 }

@@ -13,6 +13,7 @@ use crate::scene::BodyIndex;
 use crate::task::TaskSet;
 use crate::trace::{Actor, Episode, Push};
 use crate::visualize::{self, Replay};
+use crate::words::counted;
 
 /// An episode, with what is to be shown beside it.
 struct Shown {
@@ -44,8 +45,8 @@ pub(super) fn recordings(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
 
 /// Shows episodes of a dataset: also of one that was annotated elsewhere, of which there is no recording.
 pub(super) fn dataset(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
-    let playbacks =
-        args.episode.iter().map(|&episode| play_back(&args.path, episode)).collect::<Result<Vec<_>, _>>()?;
+    let episodes = args.episode.iter().flat_map(|range| range.numbers());
+    let playbacks = episodes.map(|episode| play_back(&args.path, episode)).collect::<Result<Vec<_>, _>>()?;
     let (summary, place) = match &args.save {
         Some(path) => (visualize::save_playbacks(&playbacks, path)?, path.display().to_string()),
         None if args.spawn => (visualize::spawn_playbacks(&playbacks)?, "the Rerun viewer".to_owned()),
@@ -63,7 +64,8 @@ pub(super) fn dataset(args: &ReplayArgs) -> anyhow::Result<CommandOutcome> {
         output::print_json(&json!({ "episodes": episodes, "bytes": summary.bytes, "written": place }))?;
     } else {
         let line = |(episode, frames, calls)| {
-            format!("episode {episode} of {} ({frames} frames, {calls} calls) → {place}", args.path.display())
+            let (frames, calls) = (counted(frames, "frame"), counted(calls, "call"));
+            format!("episode {episode} of {} ({frames}, {calls}) → {place}", args.path.display())
         };
         output::print(&playbacks.iter().map(counts).map(line).collect::<Vec<String>>().join("\n"))?;
     }
@@ -108,8 +110,8 @@ impl Shown {
 
     fn in_words(&self) -> String {
         let Self { found: Found { number, file, episode, .. }, demonstration, divergence } = self;
-        let (frames, calls) = (episode.frames.len(), episode.calls.len());
-        let mut words = format!("episode {number} of {} ({frames} frames, {calls} calls", file.display());
+        let (frames, calls) = (counted(episode.frames.len(), "frame"), counted(episode.calls.len(), "call"));
+        let mut words = format!("episode {number} of {} ({frames}, {calls}", file.display());
         if demonstration.is_some() {
             words.push_str(", beside its demonstration");
         }

@@ -6,6 +6,7 @@ use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Key, N_COLORS, Tick};
 use crate::report::summary::Aggregate;
 use crate::trace::Cause;
+use crate::words::counted;
 
 /// Where the axis may end.
 const ENDS: [f64; 9] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 0.75, 1.0];
@@ -100,9 +101,9 @@ fn parts(row: &Aggregate, causes: &[String], end: f64) -> Vec<BarPart> {
             at: place(share(before), 0.0, end),
             width: place(share(count), 0.0, end),
             tip: format!(
-                "{}: {count} of {} rollouts, {} %",
+                "{}: {count} of {}, {} %",
                 cause.replace('_', " "),
-                row.episodes,
+                counted(row.episodes, "rollout"),
                 percent(share(count))
             ),
         });

@@ -6,6 +6,7 @@ use crate::report::actor::model_name;
 use crate::report::chart::scale::{coordinate, nice_step, power_of_ten, thousands};
 use crate::report::chart::{PANEL, Tick, distinct};
 use crate::report::metrics::{Curve, CurvePoint, PARTS};
+use crate::words::counted;
 
 /// No decade below this is drawn: what is smaller lies on the axis.
 const LOWEST_EXPONENT: i32 = -6;
@@ -86,9 +87,9 @@ fn panel(curves: &[&Curve], part: usize, level: &str, axes: &Axes) -> CurvePanel
         let path = path(&curve.points, part, axes);
         let last = curve.points.iter().rev().find_map(|point| point.losses[part])?;
         let tip = format!(
-            "{}, {} tasks, training seed {}: {last:.4} in the end",
+            "{}, {}, training seed {}: {last:.4} in the end",
             model_name(&model.variant, &model.specification, model.tag.as_deref()),
-            model.train_tasks,
+            counted(model.train_tasks, "task"),
             model.seed
         );
         Some(Line { color: model.parts.color(false), dashed: model.parts.has_papers_encoder(), path, tip })

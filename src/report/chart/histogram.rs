@@ -7,6 +7,7 @@ use crate::report::chart::scale::{coordinate, nice_step, thousands};
 use crate::report::chart::{Key, PANEL, Tick, distinct};
 use crate::report::order;
 use crate::report::summary::{Aggregate, Divergence, FirstError};
+use crate::words::counted;
 
 /// What can differ, and its colour.
 pub(in crate::report) const KINDS: [(&str, usize); 5] =
@@ -178,7 +179,11 @@ impl Bins {
                     y: coordinate(top),
                     width: coordinate(0.84 * width),
                     height: coordinate(base - top),
-                    tip: format!("{}: {kind}, {count} rollouts", bin_name(bin as i64, self.per_bin)),
+                    tip: format!(
+                        "{}: {kind}, {count}",
+                        bin_name(bin as i64, self.per_bin),
+                        count = counted(count, "rollout")
+                    ),
                 });
                 below += count;
             }

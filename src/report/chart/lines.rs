@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{coordinate, percent, short, thousands};
 use crate::report::chart::{PANEL, Tick};
 use crate::report::figures::{Figure, Series};
+use crate::words::counted;
 
 /// One figure of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -116,14 +117,14 @@ fn line(series: &Series, places: &Places, shift: f64) -> PlotLine {
         low: coordinate(PANEL.y(point.wilson_low)),
         high: coordinate(PANEL.y(point.wilson_high)),
         tip: format!(
-            "{} at {}: {} %, interval {} to {} %, {} rollouts, {} training seeds",
+            "{} at {}: {} %, interval {} to {} %, {}, {}",
             series.variant,
             point.x,
             percent(point.success_rate),
             percent(point.wilson_low),
             percent(point.wilson_high),
-            point.episodes,
-            point.seeds
+            counted(point.episodes, "rollout"),
+            counted(point.seeds, "training seed")
         ),
     });
     let dots: Vec<PlotDot> = dots.collect();

@@ -1,5 +1,7 @@
 //! Axes: where a value lies, which marks an axis has, how a number is written.
 
+use crate::words::noun;
+
 /// A share in percent with one decimal; only what is nothing or all is written as that.
 pub(in crate::report) fn percent(share: f64) -> String {
     let tenths = (1000.0 * share).round();
@@ -31,8 +33,8 @@ pub(in crate::report) fn thousands(number: u64) -> String {
 }
 
 /// So many of something.
-pub(in crate::report) fn plural(count: u64, one: &str, many: &str) -> String {
-    format!("{} {}", thousands(count), if count == 1 { one } else { many })
+pub(in crate::report) fn many(count: u64, thing: &str) -> String {
+    format!("{} {}", thousands(count), noun(count, thing))
 }
 
 /// A difference in percentage points, with a true minus sign.

@@ -7,6 +7,7 @@
 
 use crate::report::claims::Verdict;
 use crate::report::summary::Aggregate;
+use crate::words::counted;
 
 /// The normal distribution's two-sided 95 % point.
 const Z: f64 = 1.96;
@@ -89,7 +90,8 @@ fn direction(terms: &[Term<'_>]) -> Verdict {
 /// Shares with what tells them apart.
 fn tell<'a>(rows: impl Iterator<Item = &'a Aggregate>) -> String {
     let one = |row: &Aggregate| {
-        let tasks = row.actor.train_tasks.map(|tasks| format!(", {tasks} tasks")).unwrap_or_default();
+        let tasks =
+            row.actor.train_tasks.map(|tasks| format!(", {tasks}", tasks = counted(tasks, "task"))).unwrap_or_default();
         format!("{} {:.3} ({}{tasks})", row.actor.variant, row.mean_success_rate, row.suite)
     };
     rows.map(one).collect::<Vec<_>>().join(", ")

@@ -4,7 +4,7 @@ use minijinja::Value;
 use serde::Serialize;
 
 use crate::report::actor::Actor;
-use crate::report::chart::scale::{percent, plural, points};
+use crate::report::chart::scale::{many, percent, points};
 use crate::report::order;
 use crate::report::section::{Contents, Section};
 use crate::report::summary::Aggregate;
@@ -58,7 +58,7 @@ fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
         value: percent(row.mean_success_rate),
         low: percent(row.wilson_low),
         high: percent(row.wilson_high),
-        rollouts: plural(row.episodes, "rollout", "rollouts"),
+        rollouts: many(row.episodes, "rollout"),
         paper: row.paper_success_rate.map(percent),
         lead: row.paper_success_rate.map(|paper| points(row.mean_success_rate - paper)),
     };

@@ -4,7 +4,7 @@ use minijinja::Value;
 use serde::Serialize;
 
 use crate::report::chart::curves::{self, CurveGrid};
-use crate::report::chart::scale::plural;
+use crate::report::chart::scale::many;
 use crate::report::chart::{Key, PANEL, Panel, once_each};
 use crate::report::metrics;
 use crate::report::section::{Contents, Section};
@@ -30,7 +30,7 @@ fn fill(of: &Contents<'_>) -> Learning {
     let last_step = of.curves.iter().flat_map(|curve| &curve.points).map(|point| point.step).max().unwrap_or(0);
     Learning {
         curves: curves::grids(of.curves),
-        steps_per_point: plural(metrics::steps_per_bin(last_step) as u64, "step", "steps"),
+        steps_per_point: many(metrics::steps_per_bin(last_step) as u64, "step"),
         variants: once_each(trained, |a, b| a == b),
         panel: PANEL,
     }
