@@ -1,6 +1,6 @@
 //! Runs stages in order; skips what is up to date, and says why it does not.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
@@ -199,11 +199,22 @@ fn run_units(
     units: Vec<Box<dyn Unit + '_>>,
     to_do: &mut ToDo,
 ) -> Result<Vec<StageReport>, PipelineError> {
-    // All are planned before the first is run: what is missing of one is told at once.
-    let planned: Result<Vec<(&dyn Unit, Planned)>, PipelineError> =
-        units.iter().map(|unit| Ok((unit.as_ref(), Planned::of(context, unit.as_ref())?))).collect();
-    let run = |(unit, planned): (&dyn Unit, Planned)| {
-        let planned = to_do.before(unit, context.dir).map_or(planned, Planned::Behind);
+    // All are planned before the first is run: what is missing of one is told at once. One that reads what another of them
+    // makes is planned after that.
+    let mut made = BTreeSet::new();
+    let plan = |unit: &dyn Unit| {
+        let is_later = unit.reads(context.dir).iter().any(|dir| made.contains(dir.path()));
+        made.insert(unit.dir(context.dir).path().to_owned());
+        if is_later { Ok(None) } else { Planned::of(context, unit).map(Some) }
+    };
+    let planned: Vec<Option<Planned>> =
+        units.iter().map(Box::as_ref).map(plan).collect::<Result<_, PipelineError>>()?;
+    let run = |(unit, planned): (&dyn Unit, Option<Planned>)| {
+        let planned = match (to_do.before(unit, context.dir), planned) {
+            (Some(reason), _) => Planned::Behind(reason),
+            (None, Some(planned)) => planned,
+            (None, None) => Planned::of(context, unit)?,
+        };
         let report = match planned {
             Planned::Known(plan) => run_unit(context, pipeline, unit, *plan)?,
             Planned::Behind(reason) => report_of(context, unit, Status::Needed, reason),
@@ -211,7 +222,7 @@ fn run_units(
         to_do.note(unit, context.dir, &report);
         Ok(report)
     };
-    planned?.into_iter().map(run).collect()
+    units.iter().map(Box::as_ref).zip(planned).map(run).collect()
 }
 
 /// What is known of a unit's plan.

@@ -474,7 +474,10 @@ fn settings_of_networks_and_noise_that_cannot_be_are_refused_with_what_is_allowe
     };
     let start = model("start_from = \"models/ntp-seed0\"");
     check_refused(start, "models[0].training", "start_from is set for variant ntp_vid_detector; allowed: variants");
-    let maps = training("[models.training.detector]\nheat_maps = true");
+    let maps = |text: &str| {
+        let detector = "[models.training.detector]\nheat_maps = true\n\n[rollout]";
+        text.replace("[rollout]", detector)
+    };
     check_refused(maps, "models[0].training", "detector.heat_maps is on for variant ntp; allowed: on with ntp_vid");
     let allowed = "noise.frame_m is -0.01; allowed: from 0 to 0.1";
     check_refused(training("noise = { frame_m = -0.01 }"), "models[0].training", allowed);
