@@ -19,7 +19,7 @@ mod unfinished;
 
 pub use atomic::{
     AtomicFile, IoError, PARTIAL_PREFIX, create_dir, create_json, hex, read, read_json, remove_partials, sha256_bytes,
-    sha256_file, write, write_json,
+    sha256_file, to_json, write, write_json,
 };
 pub use contract::{ContractError, FileEntry, Manifest, Receipt};
 pub use lock::{LockError, RunLock};

@@ -12,10 +12,11 @@ use crate::dataset::edit::{Ending, EpisodeRange};
 use crate::dataset::export::LabelForm;
 use crate::model::ComputeDevice;
 use crate::pipeline::{ItemRanges, Stage};
-use crate::publish::{Date, License, Place, Release};
+use crate::publish::{Date, License, Release};
 use crate::remote::Address;
 use crate::render::Channel;
 use crate::robot::RobotKind;
+use crate::store::Place;
 use crate::task::Family;
 
 /// Hierarchical robot demonstrations with true labels: made, learned from, acted and judged by one pipeline file.
@@ -125,7 +126,7 @@ pub enum Command {
 }
 
 /// How stages run.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct StageArgs {
     /// The pipeline file, or a study that names several.
     #[arg(value_name = "PIPELINE.toml")]
@@ -148,6 +149,10 @@ pub struct StageArgs {
     /// Go on where the file system has no locks and nothing else writes into the run directory.
     #[arg(long)]
     pub no_lock: bool,
+    #[expect(clippy::doc_markdown, reason = "a help text")]
+    /// The run is in a store, s3://BUCKET/RUN or a folder; --out is this machine's copy of what is needed here.
+    #[arg(long, value_name = "URL")]
+    pub store: Option<Place>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -173,7 +178,7 @@ pub struct DeviceArgs {
 }
 
 /// How much of one stage is done by this process; the whole when none is given. See docs/cluster.md.
-#[derive(Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "For many processes side by side")]
 pub struct ScopeArgs {
     /// Do these items alone, by their numbers as `ntp items` lists them, e.g. 0-3,7.
@@ -194,6 +199,9 @@ pub struct ScopeArgs {
     /// With --commit: wait so many seconds for what is missing.
     #[arg(long, value_name = "S", requires = "commit", default_value_t = 0)]
     pub wait: u64,
+    /// With --store: bring what is finished there into --out, and do nothing else.
+    #[arg(long, group = "scope", requires = "store")]
+    pub fetch: bool,
 }
 
 /// One of equal parts, as it is written: `3/64`.
@@ -229,6 +237,10 @@ pub struct ItemsArgs {
     /// The run directory [default: data/runs/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    #[expect(clippy::doc_markdown, reason = "a help text")]
+    /// The run is in a store, s3://BUCKET/RUN or a folder.
+    #[arg(long, value_name = "URL", conflicts_with = "out")]
+    pub store: Option<Place>,
     /// Only those that are not done.
     #[arg(long)]
     pub left: bool,
@@ -258,6 +270,11 @@ pub struct SubmitArgs {
     /// Items that a task does one after the other [default: generate 100, rollout 40, train 1].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub per_task: Option<u32>,
+    #[expect(clippy::doc_markdown, reason = "a help text")]
+    /// The run is in a store, s3://BUCKET/RUN or a folder; every node then has its own copy of what it needs, and the
+    /// run directory holds scripts and logs alone.
+    #[arg(long, value_name = "URL")]
+    pub store: Option<Place>,
     /// An argument for every sbatch, e.g. --sbatch-arg=--partition=cpu; may be given several times.
     #[arg(long, value_name = "ARG", allow_hyphen_values = true)]
     pub sbatch_arg: Vec<String>,
@@ -324,6 +341,10 @@ pub struct TasksArgs {
     /// Do again what is up to date.
     #[arg(long, conflicts_with = "import")]
     pub force: bool,
+    #[expect(clippy::doc_markdown, reason = "a help text")]
+    /// The run is in a store, s3://BUCKET/RUN or a folder; --out is this machine's copy of what is needed here.
+    #[arg(long, value_name = "URL", conflicts_with = "import")]
+    pub store: Option<Place>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -38,6 +38,7 @@ use crate::feature::NotBuiltIn;
 use crate::model::ComputeDevice;
 use crate::pipeline::{PipelineError, Stage};
 use crate::publish::PublishError;
+use crate::store::StoreError;
 
 /// How a command ended when it did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +114,9 @@ fn stops_in_order(command: &Command) -> bool {
 
 fn exit_code(error: &anyhow::Error) -> u8 {
     if error.downcast_ref::<UsageError>().is_some() || error.downcast_ref::<NotBuiltIn>().is_some() {
+        return 2;
+    }
+    if error.downcast_ref::<StoreError>().is_some_and(StoreError::is_usage) {
         return 2;
     }
     if matches!(error.downcast_ref(), Some(PublishError::Interrupted))

@@ -15,6 +15,7 @@ pub mod program;
 pub mod progress;
 pub mod scene;
 pub mod seed;
+pub mod store;
 pub mod table;
 pub mod words;
 

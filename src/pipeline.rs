@@ -37,6 +37,7 @@ mod spec;
 mod stage;
 mod stage_report;
 mod stale;
+mod stored;
 mod study;
 mod tasks;
 mod train;
@@ -61,5 +62,6 @@ pub use spec::{
 pub use stage::Stage;
 pub use stage_report::{StageReport, Status};
 pub use stale::{Stale, stale};
+pub use stored::bring_records;
 pub use study::{PipelineFile, Study, StudySpec};
 pub use verify::{Verification, verify};

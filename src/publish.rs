@@ -2,7 +2,7 @@
 //!
 //! # Input and output
 //!
-//! [`publish`] reads a dataset that validates and writes to a [`Destination`], a folder beside it or a place in a bucket:
+//! [`publish`] reads a dataset that validates and writes to a [`Store`], a folder beside it or a place in a bucket:
 //!
 //! ```text
 //! README.md            the card: what it is, how it was made, tables, splits, limits, how to cite
@@ -22,17 +22,13 @@
 //! what was written is read back.
 //! Memory grows with the number of files alone.
 
-#[cfg(feature = "cloud")]
-mod bucket;
 mod card;
 mod checksums;
 mod croissant;
 mod date;
-mod destination;
 mod error;
 mod facts;
 mod files;
-mod folder;
 mod license;
 mod origin;
 mod provenance;
@@ -45,16 +41,13 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::dataset::{self, Severity};
+use crate::store::Store;
 
-#[cfg(feature = "cloud")]
-pub use bucket::Bucket;
 pub use checksums::{Difference, FileDifference, Verified, verify};
 pub use date::{Date, NoDate};
-pub use destination::{BucketUrl, Creation, Destination, NoPlace, Place};
 pub use error::PublishError;
 use facts::Facts;
 use files::Moved;
-pub use folder::Folder;
 pub use license::{License, UnknownLicense};
 pub use publication::{NoRelease, Publication, Release};
 
@@ -88,11 +81,10 @@ pub struct PublishSummary {
 /// # Errors
 ///
 /// [`PublishError::Invalid`] for a dataset with faults; [`PublishError::Foreign`] and [`PublishError::Differs`] for a
-/// destination in which something else lies; [`PublishError::NoConditionalWrites`] for a bucket that would mix two
-/// publications.
+/// destination in which something else lies; [`PublishError::Store`] for a bucket that would mix two publications.
 pub fn publish(
     dataset: &Path,
-    to: &dyn Destination,
+    to: &dyn Store,
     publication: &Publication,
     go_on: impl Fn() -> bool,
 ) -> Result<PublishSummary, PublishError> {

@@ -262,7 +262,7 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, IoError> {
 ///
 /// As [`write()`].
 pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), IoError> {
-    write(path, &json_text(path, value)?)
+    write(path, &to_json(path, value)?)
 }
 
 /// Writes indented JSON if nothing is at the path; whether it is there now.
@@ -272,11 +272,16 @@ pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), IoError> {
 /// As [`AtomicFile::commit_if_absent`].
 pub fn create_json<T: Serialize>(path: &Path, value: &T) -> Result<bool, IoError> {
     let mut file = AtomicFile::create(path)?;
-    file.write_all(&json_text(path, value)?).map_err(IoError::system("write", path))?;
+    file.write_all(&to_json(path, value)?).map_err(IoError::system("write", path))?;
     file.commit_if_absent()
 }
 
-fn json_text<T: Serialize>(path: &Path, value: &T) -> Result<Vec<u8>, IoError> {
+/// Indented JSON with a line feed at its end, as it is written; the path is for errors.
+///
+/// # Errors
+///
+/// When the value has no JSON.
+pub fn to_json<T: Serialize>(path: &Path, value: &T) -> Result<Vec<u8>, IoError> {
     let mut text =
         serde_json::to_vec_pretty(value).map_err(|source| IoError::Json { path: path.to_owned(), source })?;
     text.push(b'\n');

@@ -20,6 +20,8 @@ struct Context {
     chains: Vec<ChainContext>,
     /// The study's own pipeline file, quoted; empty for an experiment by itself.
     study: String,
+    /// Where the run is, quoted; empty for the run directory.
+    store: String,
 }
 
 /// What is left of an experiment. Words are quoted for bash.
@@ -61,6 +63,7 @@ pub(super) fn submit(
         max_running: options.max_running.map(|most| most.to_string()).unwrap_or_default(),
         sbatch_args: options.sbatch_args.iter().map(|argument| shell_word(argument)).collect(),
         chains: chains.iter().map(chain).collect(),
+        store: about.store.as_deref().map(quoted).unwrap_or_default(),
         study: match file {
             PipelineFile::Experiment(_) => String::new(),
             PipelineFile::Study(_) => place(&about.pipeline),

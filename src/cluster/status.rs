@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::cluster::submission::{About, ClusterError, FOLDER};
-use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineFile, RunDir, Stage};
+use crate::artifact::IoError;
+use crate::cluster::submission::{About, ClusterError, FOLDER, run_dir};
+use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineFile, Stage};
 
 /// How far a run is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -62,9 +63,11 @@ impl RunStatus {
 ///
 /// [`ClusterError::NotSubmitted`] when nothing was handed over; otherwise when something cannot be read.
 pub fn status(run: &Path) -> Result<RunStatus, ClusterError> {
-    let file = PipelineFile::load(&About::read(run)?.pipeline_file(run))?;
+    let about = About::read(run)?;
+    let file = PipelineFile::load(&about.pipeline_file(run))?;
+    let copy = tempfile::tempdir().map_err(IoError::system("create a folder for", run))?;
     let mut stages = Vec::new();
-    for (pipeline, own) in file.experiments(&RunDir::new(run)) {
+    for (pipeline, own) in file.experiments(&run_dir(run, about.store.as_deref(), copy.path())?) {
         let experiment = matches!(file, PipelineFile::Study(_)).then(|| pipeline.spec.name.clone());
         for stage in Stage::ALL {
             let folder = experiment.as_deref().unwrap_or(".");

@@ -10,6 +10,7 @@ use crate::artifact::{IoError, create_dir, read_json, sha256_file, write, write_
 use crate::cluster::copies::Copies;
 use crate::cluster::script;
 use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineError, PipelineFile, RunDir, Stage};
+use crate::store::{NoPlace, Place, StoreError};
 
 /// The folder in a run directory.
 pub(super) const FOLDER: &str = "submit";
@@ -66,6 +67,8 @@ pub struct SubmitOptions {
     pub per_task: Option<u32>,
     /// Arguments for every `sbatch`.
     pub sbatch_args: Vec<String>,
+    /// Where the run is, if it is in a store; the run directory then holds what is handed over alone.
+    pub store: Option<Place>,
     /// Hand over another pipeline or program than before.
     pub force: bool,
 }
@@ -79,20 +82,26 @@ pub enum ClusterError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Pipeline(Box<PipelineError>),
+    #[expect(missing_docs, reason = "wraps an error that documents itself")]
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// Another pipeline or program was handed over before.
     #[error("{} was made with another {what}; --force hands over this one, where no task of the other is left", path.display())]
     Other {
         /// The earlier submission.
         path: PathBuf,
-        /// `pipeline` or `ntp`.
+        /// `pipeline`, `ntp` or `store`.
         what: &'static str,
     },
     /// Nothing was handed over.
-    #[error("nothing was submitted into {}: no submit/submit.json; ntp items PIPELINE --out RUN lists items of any run", path.display())]
+    #[error("nothing was submitted into {}: no submit/submit.json; ntp items PIPELINE with --out RUN or --store URL lists items of any run", path.display())]
     NotSubmitted {
         /// The run directory.
         path: PathBuf,
     },
+    /// What is kept of a submission names no store.
+    #[error(transparent)]
+    NoStore(#[from] NoPlace),
     /// The script cannot be written.
     #[error("the template of a script: {0}")]
     Template(#[from] minijinja::Error),
@@ -110,7 +119,8 @@ impl ClusterError {
         match self {
             Self::Other { .. } => true,
             Self::Pipeline(error) => error.is_usage(),
-            Self::Io(_) | Self::NotSubmitted { .. } | Self::Template(_) => false,
+            Self::Store(error) => error.is_usage(),
+            Self::Io(_) | Self::NotSubmitted { .. } | Self::NoStore(_) | Self::Template(_) => false,
         }
     }
 }
@@ -124,6 +134,9 @@ pub(super) struct About {
     pipeline_sha256: String,
     ntp_sha256: String,
     engine: Engine,
+    /// Where the run is, if it is in a store.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) store: Option<String>,
 }
 
 impl About {
@@ -179,6 +192,8 @@ impl Submission {
     ) -> Result<Self, ClusterError> {
         let folder = run.join(FOLDER);
         check_models(file)?;
+        check_store(file, options)?;
+        let store = options.store.as_ref().map(whole_name).transpose()?;
         let copies = Copies::of(file)?;
         let (pipeline_sha256, ntp_sha256) = (copies.hash()?, sha256_file(program)?);
         let before: Option<About> = About::read(run).ok();
@@ -190,14 +205,18 @@ impl Submission {
             if before.ntp_sha256 != ntp_sha256 {
                 return Err(other("ntp"));
             }
+            if before.store != store {
+                return Err(other("store"));
+            }
         }
         if before.is_none_or(|before| before.ntp_sha256 != ntp_sha256) {
             copy_program(program, &folder.join("ntp"))?;
         }
         let pipeline = copies.write(&folder.join("pipeline"))?;
-        let about = About { version: VERSION, pipeline, pipeline_sha256, ntp_sha256, engine: options.engine };
+        let about = About { version: VERSION, pipeline, pipeline_sha256, ntp_sha256, engine: options.engine, store };
         write_json(&folder.join(ABOUT), &about)?;
-        let chains = chains(file, run, options)?;
+        let copy = tempfile::tempdir().map_err(IoError::system("create a folder for", run))?;
+        let chains = chains(file, run, &run_dir(run, about.store.as_deref(), copy.path())?, options)?;
         write(&folder.join("task.sh"), script::TASK.as_bytes())?;
         let path = folder.join("submit.sh");
         write(&path, script::submit(file, &about, &chains, options)?.as_bytes())?;
@@ -227,11 +246,47 @@ fn check_models(file: &PipelineFile) -> Result<(), PipelineError> {
     }
 }
 
+fn check_store(file: &PipelineFile, options: &SubmitOptions) -> Result<(), PipelineError> {
+    match (file, &options.store) {
+        (PipelineFile::Study(study), Some(_)) => Err(PipelineError::Value {
+            path: study.path.clone(),
+            key: "--store".to_owned(),
+            problem: "is of one experiment: give its own file".to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A place as every folder would name it.
+fn whole_name(place: &Place) -> Result<String, IoError> {
+    match place {
+        Place::Folder(path) => {
+            let whole = std::path::absolute(path).map_err(IoError::system("find", path))?;
+            Ok(whole.to_string_lossy().into_owned())
+        }
+        Place::Bucket(url) => Ok(url.to_string()),
+    }
+}
+
+/// Where it is told how far a run is: in its directory, or in a copy of what a store tells.
+pub(super) fn run_dir(run: &Path, store: Option<&str>, copy: &Path) -> Result<RunDir, ClusterError> {
+    let Some(store) = store else { return Ok(RunDir::new(run)) };
+    let place: Place = store.parse()?;
+    let records = RunDir::new(copy).with_files_elsewhere();
+    pipeline::bring_records(place.open()?.as_ref(), &records)?;
+    Ok(records)
+}
+
 /// What is left of each experiment, with a list a stage of the items of each task.
-fn chains(file: &PipelineFile, run: &Path, options: &SubmitOptions) -> Result<Vec<Chain>, ClusterError> {
+fn chains(
+    file: &PipelineFile,
+    run: &Path,
+    records: &RunDir,
+    options: &SubmitOptions,
+) -> Result<Vec<Chain>, ClusterError> {
     let copied = Copies::of(file)?;
     let mut chains = Vec::new();
-    for (pipeline, own) in file.experiments(&RunDir::new(run)) {
+    for (pipeline, own) in file.experiments(records) {
         let folder = match file {
             PipelineFile::Experiment(_) => ".".to_owned(),
             PipelineFile::Study(_) => pipeline.spec.name.clone(),

@@ -22,6 +22,7 @@ pub(super) fn submit(args: &SubmitArgs) -> anyhow::Result<CommandOutcome> {
         max_running: args.max_running,
         per_task: args.per_task,
         sbatch_args: args.sbatch_arg.clone(),
+        store: args.store.clone(),
         force: args.force,
     };
     let program = std::env::current_exe().context("failed to find this program")?;

@@ -1,17 +1,25 @@
 //! `ntp items PIPELINE`: the work that processes can share.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use crate::cli::ItemsArgs;
 use crate::commands::stages::run_directory;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineFile, RunDir, Stage};
+use crate::store::Place;
 use crate::words::counted;
 
 pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
     let file = PipelineFile::load(&args.pipeline)?;
-    let run = RunDir::new(run_directory(args.out.as_deref(), &file));
     let is_study = matches!(file, PipelineFile::Study(_));
+    let copy = tempfile::tempdir()?;
+    let run = match &args.store {
+        None => RunDir::new(run_directory(args.out.as_deref(), &file)),
+        Some(_) if is_study => return Err(UsageError("--store is of one experiment: give its own file".into()).into()),
+        Some(store) => records(store, copy.path())?,
+    };
     if is_study && args.array {
         return Err(
             UsageError("--array is of one experiment: give its own file, and --out DIR/EXPERIMENT".into()).into()
@@ -34,6 +42,13 @@ pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
         output::print(&all.iter().map(to_line).collect::<Vec<String>>().join("\n"))?;
     }
     Ok(CommandOutcome::Done)
+}
+
+/// What a store tells of a run, in a folder of its own.
+fn records(store: &Place, copy: &Path) -> anyhow::Result<RunDir> {
+    let run = RunDir::new(copy).with_files_elsewhere();
+    pipeline::bring_records(store.open()?.as_ref(), &run)?;
+    Ok(run)
 }
 
 fn to_json((experiment, item): &(Option<&str>, Item)) -> anyhow::Result<Value> {

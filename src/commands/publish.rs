@@ -8,7 +8,8 @@ use crate::cli::PublishArgs;
 use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::summarize;
-use crate::publish::{Place, Publication, publish};
+use crate::publish::{Publication, publish};
+use crate::store::Place;
 use crate::words::{counted, shell_path};
 
 pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {

@@ -11,6 +11,7 @@ use crate::cli::{Part, ScopeArgs, StageArgs};
 use crate::commands::{CommandOutcome, output};
 use crate::model::ComputeDevice;
 use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Stale, Status};
+use crate::store::Place;
 use crate::words::{counted, shell_path};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
@@ -45,6 +46,13 @@ pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result
         return Ok(CommandOutcome::Done);
     }
     let folder = dir.report();
+    if args.store.is_some() {
+        if outcome(&reports) == CommandOutcome::CheckFailed {
+            reports.iter().try_for_each(|report| output::print(&line(report)))?;
+            return Ok(CommandOutcome::CheckFailed);
+        }
+        fetch_report(args, stop)?;
+    }
     if args.json {
         let text = artifact::read(&folder.path().join("report.json"))?;
         output::print(&String::from_utf8(text)?)?;
@@ -56,6 +64,12 @@ pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result
     Ok(CommandOutcome::Done)
 }
 
+/// Brings a report that is up to date in the store, and may have been made elsewhere.
+fn fetch_report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<()> {
+    let fetch = StageArgs { scope: ScopeArgs { fetch: true, ..ScopeArgs::default() }, ..args.clone() };
+    run_stages(&fetch, ComputeDevice::Cpu, Stage::Report, Stage::Report, stop).map(|_| ())
+}
+
 fn run_stages(
     args: &StageArgs,
     device: ComputeDevice,
@@ -64,7 +78,11 @@ fn run_stages(
     stop: &Arc<AtomicBool>,
 ) -> anyhow::Result<(RunDir, Vec<StageReport>)> {
     let file = PipelineFile::load(&args.pipeline)?;
-    let dir = RunDir::new(run_directory(args.out.as_deref(), &file));
+    let store = args.store.as_ref().map(Place::open).transpose()?;
+    // What a dry run looks at in a store is no copy to be kept.
+    let looked_at = store.as_ref().filter(|_| args.dry_run).map(|_| tempfile::tempdir()).transpose()?;
+    let out = looked_at.as_ref().map(|folder| folder.path()).or(args.out.as_deref());
+    let dir = RunDir::new(run_directory(out, &file));
     let options = Options {
         from,
         to,
@@ -74,6 +92,7 @@ fn run_stages(
         dry_run: args.dry_run,
         force: args.force,
         no_lock: args.no_lock,
+        store: store.map(Arc::from),
         progress: true,
         commit: commit_of,
         experiment: None,
@@ -92,7 +111,7 @@ fn run_stages(
 /// Says what the stages read that the pipeline file would make otherwise now: they took it as it is.
 fn say_stale(args: &StageArgs, stale: &[Stale], from: Stage) {
     stale.iter().for_each(|stale| output::note(&format!("stale: {stale}")));
-    if !stale.is_empty() {
+    if !stale.is_empty() && args.store.is_none() {
         let (pipeline, out) = (shell_path(&args.pipeline), args.out.as_deref().map(shell_path));
         let out = out.map(|out| format!(" --out {out}")).unwrap_or_default();
         output::note(&format!("{from} takes it as it is; ntp run {pipeline}{out} makes it anew"));
@@ -104,6 +123,7 @@ fn scope(args: &ScopeArgs) -> Scope {
         ScopeArgs { items: Some(ItemRanges(ranges)), .. } => Scope::Items(ranges.clone()),
         ScopeArgs { part: Some(Part { part, of }), .. } => Scope::Part { part: *part, of: *of },
         ScopeArgs { shard: Some(shard), .. } => Scope::Shard(*shard),
+        ScopeArgs { fetch: true, .. } => Scope::Fetch,
         ScopeArgs { begin: true, .. } => Scope::Begin,
         ScopeArgs { commit: true, wait, .. } => Scope::Commit { wait_secs: *wait },
         _ => Scope::Whole,
@@ -139,7 +159,7 @@ pub(super) fn line(report: &StageReport) -> String {
     let what = match report.status {
         Status::UpToDate => "up to date".to_owned(),
         Status::Done => format!("done (before: {})", report.reason),
-        Status::ShardDone => report.reason.clone(),
+        Status::ShardDone | Status::Fetched => report.reason.clone(),
         Status::Begun => format!("begun ({})", report.reason),
         Status::Needed => format!("to do: {}", report.reason),
         Status::Missing => report.reason.clone(),

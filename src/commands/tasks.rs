@@ -25,6 +25,7 @@ pub(super) fn run(args: &TasksArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Co
         force: args.force,
         scope: ScopeArgs::default(),
         no_lock: false,
+        store: args.store.clone(),
         json: args.json,
     };
     stages::run(&stage_args, ComputeDevice::Cpu, Stage::Tasks, Stage::Tasks, stop)

@@ -17,6 +17,8 @@ use crate::pipeline::{RunDir, Stage};
 use crate::progress::Taken;
 
 const VERSION: u32 = 1;
+/// Where that lies which processes did side by side.
+pub(super) const FOLDER: &str = "costs";
 
 /// What a run took, by the names of its units.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,14 +74,16 @@ impl Measured<'_> {
     }
 
     /// Notes what shards have just taken that a process did beside others: in a file of their own, so that nobody waits.
+    /// Where it is; `None` where no shard was done.
     ///
     /// # Errors
     ///
     /// When the file cannot be written.
-    pub(super) fn note(&self, run: &RunDir, taken: Taken, shards: BTreeSet<u32>) -> Result<(), IoError> {
-        let Some(first) = shards.first() else { return Ok(()) };
+    pub(super) fn note(&self, run: &RunDir, taken: Taken, shards: BTreeSet<u32>) -> Result<Option<PathBuf>, IoError> {
+        let Some(first) = shards.first() else { return Ok(None) };
         let path = folder(run, self.unit).join(format!("shard-{first:05}.json"));
-        write_json(&path, &self.cost(taken, shards))
+        write_json(&path, &self.cost(taken, shards))?;
+        Ok(Some(path))
     }
 }
 
@@ -146,7 +150,7 @@ fn noted(folder: &Path) -> impl Iterator<Item = UnitCost> + use<> {
 }
 
 fn folder(run: &RunDir, unit: &str) -> PathBuf {
-    run.root().join("costs").join(unit.replace(' ', "/"))
+    run.root().join(FOLDER).join(unit.replace(' ', "/"))
 }
 
 fn path(run: &RunDir) -> PathBuf {

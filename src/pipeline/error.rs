@@ -11,6 +11,7 @@ use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::rollout::RolloutError;
 use crate::sim::SimError;
+use crate::store::StoreError;
 use crate::table::TableError;
 use crate::task::{ImportError, SampleError, TaskFileError, TaskSetError};
 use crate::trace::TraceError;
@@ -47,6 +48,9 @@ pub enum PipelineError {
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Io(#[from] IoError),
+    #[expect(missing_docs, reason = "wraps an error that documents itself")]
+    #[error(transparent)]
+    Store(#[from] StoreError),
     #[expect(missing_docs, reason = "wraps an error that documents itself")]
     #[error(transparent)]
     Video(#[from] VideoError),
@@ -150,6 +154,7 @@ impl PipelineError {
             Self::Syntax { .. } | Self::Value { .. } | Self::NotBuiltIn(_) => true,
             Self::Contract(error) => matches!(error, ContractError::OtherPlan { .. }),
             Self::Device(error) => error.is_usage(),
+            Self::Store(error) => error.is_usage(),
             _ => false,
         }
     }

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::artifact::{IoError, read_json, write_json};
 use crate::pipeline::{RunDir, Stage};
 
+/// Where they lie.
+pub(super) const FOLDER: &str = "failed";
+
 /// How an item failed the last time.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
@@ -49,8 +52,9 @@ impl Failure {
     }
 }
 
-fn path(run: &RunDir, stage: Stage, item: u64) -> PathBuf {
-    run.root().join("failed").join(format!("{stage}-{item}.json"))
+/// Where the failure of an item lies.
+pub(super) fn path(run: &RunDir, stage: Stage, item: u64) -> PathBuf {
+    run.root().join(FOLDER).join(format!("{stage}-{item}.json"))
 }
 
 fn node() -> Option<String> {

@@ -111,8 +111,8 @@ enum State {
     Finished,
     /// Nothing is there, or of another plan, or what it reads is not there.
     Open,
-    /// Shards of a plan may be there.
-    Begun { dir: StageDir, plan_id: String },
+    /// Shards of a plan may be there. What has one shard alone is done when it is finished.
+    Begun { dir: StageDir, plan_id: String, has_parts: bool },
 }
 
 impl State {
@@ -126,14 +126,18 @@ impl State {
             return Ok(Self::Open);
         }
         let is_finished = dir.manifest()?.is_some_and(|manifest| dir.check_files(&manifest, false).is_ok());
-        Ok(if is_finished { Self::Finished } else { Self::Begun { dir, plan_id: plan.id() } })
+        Ok(if is_finished {
+            Self::Finished
+        } else {
+            Self::Begun { dir, plan_id: plan.id(), has_parts: plan.shards > 1 }
+        })
     }
 
     fn is_done(&self, shard: u32) -> Result<bool, PipelineError> {
         match self {
             Self::Finished => Ok(true),
             Self::Open => Ok(false),
-            Self::Begun { dir, plan_id } => Ok(dir.receipt(plan_id, shard)?.is_some()),
+            Self::Begun { dir, plan_id, has_parts } => Ok(*has_parts && dir.receipt(plan_id, shard)?.is_some()),
         }
     }
 }
@@ -159,7 +163,7 @@ impl Numbered<'_> {
     /// The shards of this unit that a process is asked for.
     pub(super) fn asked(&self, scope: &Scope, n_items: u64) -> Vec<u32> {
         let is_asked = |item: u64, shard: u32| match scope {
-            Scope::Whole | Scope::Begin | Scope::Commit { .. } => true,
+            Scope::Whole | Scope::Begin | Scope::Commit { .. } | Scope::Fetch => true,
             Scope::Shard(asked) => *asked == shard,
             Scope::Items(ranges) => ranges.iter().any(|range| range.contains(&item)),
             Scope::Part { part, of } => part_of(*part, *of, n_items).contains(&item),

@@ -7,18 +7,29 @@ use crate::pipeline::ModelSpec;
 use crate::pipeline::Stage;
 use crate::trace::SpecificationForm;
 
+/// The folders of its stages.
+pub(super) const FOLDERS: [&str; 6] = ["tasks", "recordings", "dataset", "models", "rollouts", "report"];
+
 /// A run directory.
 #[derive(Clone, Debug)]
 pub struct RunDir {
     root: PathBuf,
     /// The run directory of the study that it is part of.
     study: Option<PathBuf>,
+    /// Whether files of stages may lie elsewhere.
+    has_files_elsewhere: bool,
 }
 
 impl RunDir {
     /// The run directory at `root`; nothing is read or written.
     pub fn new(root: impl Into<PathBuf>) -> Self {
-        Self { root: root.into(), study: None }
+        Self { root: root.into(), study: None, has_files_elsewhere: false }
+    }
+
+    /// The same where plans, receipts and manifests lie, and other files of its stages may lie elsewhere.
+    #[must_use]
+    pub fn with_files_elsewhere(self) -> Self {
+        Self { has_files_elsewhere: true, ..self }
     }
 
     /// Where it is.
@@ -28,16 +39,19 @@ impl RunDir {
 
     /// The run directory of an experiment of a study.
     pub fn experiment(&self, name: &str) -> Self {
-        Self { root: self.root.join(name), study: Some(self.root.clone()) }
+        let has_files_elsewhere = self.has_files_elsewhere;
+        Self { root: self.root.join(name), study: Some(self.root.clone()), has_files_elsewhere }
     }
 
     /// The run directory of the study that an experiment is part of; its own for anything else.
     pub(super) fn of_study(&self) -> Self {
-        Self { root: self.study.as_ref().unwrap_or(&self.root).clone(), study: None }
+        let root = self.study.as_ref().unwrap_or(&self.root).clone();
+        Self { root, study: None, has_files_elsewhere: self.has_files_elsewhere }
     }
 
     fn stage(&self, stage: Stage, folder: &str) -> StageDir {
-        StageDir::new(stage.name(), self.root.join(folder))
+        let dir = StageDir::new(stage.name(), self.root.join(folder));
+        if self.has_files_elsewhere { dir.with_files_elsewhere() } else { dir }
     }
 
     /// `tasks/tasks.json`.

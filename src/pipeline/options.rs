@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::model::ComputeDevice;
 use crate::pipeline::Stage;
+use crate::store::Store;
 
 /// What the command line chooses.
 #[derive(Clone, Debug)]
@@ -26,6 +27,8 @@ pub struct Options {
     pub force: bool,
     /// Go on where the file system has no locks.
     pub no_lock: bool,
+    /// Where the run is, if it is in a store: what lies in the run directory is then this machine's copy of a part of it.
+    pub store: Option<Arc<dyn Store>>,
     /// Whether progress is shown on stderr.
     pub progress: bool,
     /// Of which commit the pipeline file is, for the costs; asked when something was done.
@@ -59,14 +62,18 @@ pub enum Scope {
         /// For so many seconds it is waited for what is missing.
         wait_secs: u64,
     },
+    /// What is finished in the store is brought here, of several stages too.
+    Fetch,
+}
+
+impl Options {
+    /// Whether other processes may do the same at the same time.
+    pub(super) fn is_shared(&self) -> bool {
+        self.store.is_some() || !matches!(self.scope, Scope::Whole | Scope::Begin)
+    }
 }
 
 impl Scope {
-    /// Whether other processes may do the same at the same time.
-    pub(super) fn is_shared(&self) -> bool {
-        !matches!(self, Self::Whole | Self::Begin)
-    }
-
     /// The option of the command line that chose it.
     pub(super) fn option(&self) -> &'static str {
         match self {
@@ -76,6 +83,7 @@ impl Scope {
             Self::Items(_) => "--items",
             Self::Part { .. } => "--part",
             Self::Commit { .. } => "--commit",
+            Self::Fetch => "--fetch",
         }
     }
 }

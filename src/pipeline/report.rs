@@ -12,8 +12,8 @@ use crate::annotate::ANNOTATION;
 use crate::artifact::{StageDir, sha256_file};
 #[cfg(not(feature = "report"))]
 use crate::feature::{Feature, NotBuiltIn};
-use crate::pipeline::unit::{Amount, Job, Unit, Worker};
-use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, rollout};
+use crate::pipeline::unit::{Amount, Job, Looked, Unit, Worker};
+use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, costs, rollout, train};
 
 /// Raised when a report says something else of the same results.
 const VERSION: u32 = 5;
@@ -79,6 +79,16 @@ impl Unit for Report<'_> {
             self.acted(pipeline).into_iter().map(|unit| unit.dir(&run)).collect::<Vec<_>>()
         };
         self.runs(run).into_iter().flat_map(units).collect()
+    }
+
+    fn looks_at(&self, run: &RunDir) -> Vec<Looked> {
+        let of_run = |(pipeline, run): (&'_ Pipeline, RunDir)| {
+            let records = [run.recordings(), run.dataset()].map(Looked::Record);
+            let models = train::units(pipeline).into_iter().map(|model| Looked::Files(model.dir(&run)));
+            let others = [Looked::Files(run.tasks()), Looked::Notes(costs::FOLDER)];
+            records.into_iter().chain(models).chain(others).collect::<Vec<_>>()
+        };
+        self.runs(run).into_iter().flat_map(of_run).collect()
     }
 
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {

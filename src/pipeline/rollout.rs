@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::artifact::{FileEntry, Manifest, StageDir};
+use crate::artifact::{FileEntry, Manifest, Receipt, StageDir};
 use crate::model::{ComputeDevice, Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
@@ -166,17 +166,15 @@ impl Unit for Suite<'_> {
     }
 
     /// Puts the shards' rows into one table.
-    fn gather(&self, job: &Job<'_>) -> Result<Vec<&'static str>, PipelineError> {
+    fn gather(&self, job: &Job<'_>, receipts: &[Receipt]) -> Result<Vec<&'static str>, PipelineError> {
         let mut rows = RolloutRows::default();
         let mut detections: Option<DetectionRows> = None;
-        for shard in 0..job.plan.shards {
-            for file in job.receipt(shard)?.iter().flat_map(|receipt| &receipt.files) {
-                let path = job.dir.path().join(&file.path);
-                if file.path.starts_with(PART) {
-                    rows.append(RolloutRows::read(&path)?);
-                } else if file.path.starts_with(DETECTIONS_PART) {
-                    detections.get_or_insert_default().append(DetectionRows::read(&path)?);
-                }
+        for file in receipts.iter().flat_map(|receipt| &receipt.files) {
+            let path = job.dir.path().join(&file.path);
+            if file.path.starts_with(PART) {
+                rows.append(RolloutRows::read(&path)?);
+            } else if file.path.starts_with(DETECTIONS_PART) {
+                detections.get_or_insert_default().append(DetectionRows::read(&path)?);
             }
         }
         rows.write(&job.dir.path().join(TABLE))?;
@@ -186,6 +184,10 @@ impl Unit for Suite<'_> {
             tables.push(detections::TABLE);
         }
         Ok(tables)
+    }
+
+    fn gathers(&self, file: &str) -> bool {
+        file.starts_with(PART) || file.starts_with(DETECTIONS_PART)
     }
 
     fn told(&self, manifest: &Manifest) -> String {

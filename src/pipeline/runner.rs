@@ -51,23 +51,31 @@ fn run_experiment(
 ) -> Result<Vec<StageReport>, PipelineError> {
     check_scope(pipeline, options)?;
     check_device(options)?;
+    let dir = &if options.store.is_some() { dir.clone().with_files_elsewhere() } else { dir.clone() };
     let _lock = lock(dir, options)?;
-    if !options.dry_run && !options.scope.is_shared() {
+    if !options.dry_run && !options.is_shared() {
         remove_partials(dir.root())?;
+    }
+    if let Some(store) = options.store.as_ref().filter(|_| !options.dry_run) {
+        store.check_conditions()?;
     }
     let pool = pool(&pipeline.path, options)?;
     let context = Context { dir, options };
     let mut reports = Vec::new();
     for stage in Stage::ALL.into_iter().filter(|stage| (options.from..=options.to).contains(stage)) {
         let stage_units = units(pipeline, stage);
-        let of_stage = pool.install(|| match options.scope {
-            Scope::Whole => run_units(&context, &pipeline.path, stage_units, to_do),
+        let of_stage = pool.install(|| match (&options.scope, &options.store) {
+            (Scope::Whole, None) => run_units(&context, &pipeline.path, stage_units, to_do),
             _ => shared::run_units(&context, pipeline, stage_units),
         })?;
         if options.progress && !options.dry_run {
             of_stage.iter().filter(|report| report.status == Status::UpToDate).for_each(say_up_to_date);
         }
+        let is_left = of_stage.iter().any(|report| matches!(report.status, Status::Failed | Status::Missing));
         reports.extend(of_stage);
+        if is_left {
+            break;
+        }
     }
     Ok(reports)
 }
@@ -79,11 +87,13 @@ fn run_experiment(
 ///
 /// As [`run`]; [`PipelineError::Value`] for items, which are of one experiment.
 pub fn run_study(study: &Study, dir: &RunDir, options: &Options) -> Result<Vec<StageReport>, PipelineError> {
+    if options.store.is_some() {
+        return Err(value(&study.path, "--store", "is of one experiment: give its own file".to_owned()));
+    }
     let is_report_alone = options.from == Stage::Report;
     if options.scope != Scope::Whole && !is_report_alone {
         let problem = "is of one experiment: give its own file, and --out DIR/EXPERIMENT".to_owned();
-        let key = options.scope.option().to_owned();
-        return Err(PipelineError::Value { path: study.path.clone(), key, problem });
+        return Err(value(&study.path, options.scope.option(), problem));
     }
     let _lock = lock(dir, options)?;
     let (mut reports, mut to_do) = (Vec::new(), ToDo::default());
@@ -124,6 +134,10 @@ fn run_models(
     Ok(reports)
 }
 
+fn value(path: &Path, key: &str, problem: String) -> PipelineError {
+    PipelineError::Value { path: path.to_owned(), key: key.to_owned(), problem }
+}
+
 fn pool(path: &Path, options: &Options) -> Result<rayon::ThreadPool, PipelineError> {
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|error| PipelineError::Value {
         path: path.to_owned(),
@@ -142,7 +156,11 @@ pub(super) fn units(pipeline: &Pipeline, stage: Stage) -> Vec<Box<dyn Unit + '_>
 
 /// Refuses what the chosen stages cannot be asked for.
 fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineError> {
-    let Options { from, to, ref scope, dry_run, .. } = *options;
+    let Options { from, to, ref scope, dry_run, force, .. } = *options;
+    if force && options.store.is_some() {
+        let problem = "is of no use with --store: nothing in a store is removed; allowed is another --store";
+        return Err(value(&pipeline.path, "--force", problem.to_owned()));
+    }
     // Before hours of work, and not after them.
     if to == Stage::Report && !dry_run {
         Feature::Report.require()?;
@@ -150,6 +168,10 @@ fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineErr
     let problem = match scope {
         _ if from > to => Some(("--from", format!("is {from}, which comes after --to {to}"))),
         Scope::Whole => None,
+        Scope::Fetch if options.store.is_some() => None,
+        Scope::Fetch => {
+            return Err(value(&pipeline.path, "--fetch", "is of a run in a store; it needs --store".into()));
+        }
         scope if from != to => Some((scope.option(), "is of one stage, and this command runs several".to_owned())),
         Scope::Shard(_) if !to.has_shards() => Some((scope.option(), format!("is of no use to {to}, which has none"))),
         _ => None,
@@ -160,8 +182,7 @@ fn check_scope(pipeline: &Pipeline, options: &Options) -> Result<(), PipelineErr
         "--from" => "stages run in the order tasks, generate, convert, train, rollout, report".to_owned(),
         _ => format!("stages with shards are {}", with_shards.collect::<Vec<_>>().join(", ")),
     };
-    let problem = format!("{problem}; {allowed}");
-    Err(PipelineError::Value { path: pipeline.path.clone(), key: key.to_owned(), problem })
+    Err(value(&pipeline.path, key, format!("{problem}; {allowed}")))
 }
 
 /// Refuses a device that cannot be used, where one is needed.
@@ -178,7 +199,7 @@ fn lock(dir: &RunDir, options: &Options) -> Result<Option<RunLock>, PipelineErro
     if options.dry_run {
         return Ok(None);
     }
-    if options.scope.is_shared() {
+    if options.is_shared() {
         return shared::lock(dir, options);
     }
     match RunLock::take(dir.root()) {
@@ -305,8 +326,9 @@ pub(super) fn run_shard(
 
 /// Commits a unit whose shards are done.
 pub(super) fn finish(unit: &dyn Unit, job: &Job<'_>, told: Option<String>) -> Result<(), PipelineError> {
-    let tables = unit.gather(job)?;
-    let manifest = job.dir.commit(&job.plan, &tables)?;
+    let receipts = job.dir.all_receipts(&job.plan)?;
+    let tables = unit.gather(job, &receipts)?;
+    let manifest = job.dir.commit_receipts(&job.plan, receipts, &tables)?;
     job.progress.finish(&told.unwrap_or_else(|| unit.told(&manifest)));
     Ok(())
 }

@@ -4,18 +4,19 @@
 //!
 //! An item joins a plan or is refused; it removes nothing that it has not made. A commit does no work. Where the file
 //! system has locks, items and commits share that of the run directory, so that no whole run clears away what they
-//! are writing; where it has none they go on, since names are taken once and receipts decide.
+//! are writing; where it has none they go on, since names are taken once and receipts decide. Where the run is in a
+//! store, done is what the store has a receipt of.
+
+mod items;
 
 use std::time::Duration;
 
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-
-use crate::artifact::{ContractError, LockError, RunLock, remove_partials};
-use crate::pipeline::costs::Measured;
-use crate::pipeline::failures::Failure;
+use crate::artifact::{ContractError, LockError, Plan, Receipt, RunLock, StageDir, remove_partials};
 use crate::pipeline::items::{ItemRanges, Numbered, number};
-use crate::pipeline::runner::{finish, report_of, run_shard, why_needed};
-use crate::pipeline::unit::{Context, Job, Made, Unit, open};
+use crate::pipeline::runner::{report_of, why_needed};
+use crate::pipeline::shared::items::run_items;
+use crate::pipeline::stored::Stored;
+use crate::pipeline::unit::{Context, Job, Unit};
 use crate::pipeline::{Options, Pipeline, PipelineError, RunDir, Scope, StageReport, Status};
 use crate::progress::{self, Stopwatch};
 use crate::words::counted;
@@ -63,16 +64,83 @@ pub(super) fn run_units(
 ) -> Result<Vec<StageReport>, PipelineError> {
     let numbered = number(units);
     match context.options.scope {
+        Scope::Whole => run_whole(context, pipeline, &numbered),
         Scope::Begin => numbered.iter().map(|numbered| begin(context, numbered.unit.as_ref())).collect(),
         Scope::Commit { wait_secs } => commit(context, &numbered, wait_secs),
+        Scope::Fetch => numbered.iter().map(|numbered| fetch(context, numbered)).collect(),
         _ => run_items(context, pipeline, &numbered),
     }
 }
 
-/// Writes the plan of a unit. What another plan has finished goes by `--force` alone.
+/// Does every item that is left, then commits.
+fn run_whole(
+    context: &Context<'_>,
+    pipeline: &Pipeline,
+    numbered: &[Numbered<'_>],
+) -> Result<Vec<StageReport>, PipelineError> {
+    let done = run_items(context, pipeline, numbered)?;
+    if context.options.dry_run || done.iter().any(|report| report.status == Status::Failed) {
+        return Ok(done);
+    }
+    let is_new = |report: &&StageReport| report.status == Status::ShardDone;
+    let is_done_now = |report: &StageReport| done.iter().filter(is_new).any(|done| done.unit == report.unit);
+    let tell = |report: StageReport| match report.status {
+        // What has one shard alone was committed with it.
+        Status::UpToDate if is_done_now(&report) => {
+            StageReport { status: Status::Done, reason: "not done yet".to_owned(), ..report }
+        }
+        _ => report,
+    };
+    Ok(commit(context, numbered, 0)?.into_iter().map(tell).collect())
+}
+
+/// Brings what is finished in the store.
+fn fetch(context: &Context<'_>, numbered: &Numbered<'_>) -> Result<StageReport, PipelineError> {
+    context.go_on()?;
+    let unit = numbered.unit.as_ref();
+    let dir = unit.dir(context.dir);
+    let found = Stored::of(context).map_or(Ok(None), |stored| stored.bring_stage(&dir))?;
+    let Some(manifest) = found else {
+        let report = report_of(context, unit, Status::Missing, "not finished in the store".to_owned());
+        return Ok(StageReport { missing: numbered.numbers.clone().collect(), ..report });
+    };
+    let report = report_of(context, unit, Status::Fetched, "fetched".to_owned());
+    Ok(StageReport { episodes: manifest.episodes, failed: manifest.failed, ..report })
+}
+
+/// The plan of a unit, once what it reads is known here.
+fn plan_of(context: &Context<'_>, unit: &dyn Unit) -> Result<Plan, PipelineError> {
+    Stored::of(context).map_or(Ok(()), |stored| stored.bring_plans(unit))?;
+    context.plan(unit)
+}
+
+/// The plan that all processes work by, once the unit's folder has it. A folder of another plan is refused.
+fn settle(context: &Context<'_>, unit: &dyn Unit, plan: Plan) -> Result<Plan, PipelineError> {
+    let dir = unit.dir(context.dir);
+    if let Some(difference) = dir.plan()?.and_then(|own| own.difference(&plan)) {
+        let again = match Stored::of(context) {
+            Some(_) => format!("{difference}; a run in a store is begun anew by another --store and --out"),
+            None => format!("{difference}; ntp {} --begin --force begins anew", plan.stage),
+        };
+        return Err(ContractError::OtherPlan { path: dir.path().to_owned(), difference: again }.into());
+    }
+    if context.options.dry_run {
+        return Ok(plan);
+    }
+    let plan = Stored::of(context).map_or(Ok(plan.clone()), |stored| stored.settle(&dir, &plan))?;
+    if !unit.appears_whole() {
+        dir.join(&plan)?;
+    }
+    Ok(plan)
+}
+
+/// Writes the plan of a unit. What another plan has finished goes by `--force` alone, and in a store never.
 fn begin(context: &Context<'_>, unit: &dyn Unit) -> Result<StageReport, PipelineError> {
     let Options { force, dry_run, .. } = *context.options;
-    let plan = context.plan(unit)?;
+    let plan = plan_of(context, unit)?;
+    if Stored::of(context).is_some() {
+        return begin_in_store(context, unit, plan);
+    }
     let dir = unit.dir(context.dir);
     let difference = dir.plan()?.map(|own| own.difference(&plan));
     let receipts = dir.count_receipts()?;
@@ -98,172 +166,15 @@ fn begin(context: &Context<'_>, unit: &dyn Unit) -> Result<StageReport, Pipeline
     Ok(report_of(context, unit, Status::Begun, reason))
 }
 
-/// Does items, and goes on with the others where one fails.
-fn run_items(
-    context: &Context<'_>,
-    pipeline: &Pipeline,
-    numbered: &[Numbered<'_>],
-) -> Result<Vec<StageReport>, PipelineError> {
-    let n_items = numbered.last().map_or(0, |last| last.numbers.end);
-    check_asked(context, pipeline, numbered, n_items)?;
-    let mut reports = Vec::new();
-    for numbered in numbered {
-        let shards = numbered.asked(&context.options.scope, n_items);
-        if !shards.is_empty() {
-            context.go_on()?;
-            reports.extend(Items { context, pipeline, numbered }.run(shards)?);
-        }
-    }
-    Ok(reports)
-}
-
-/// Refuses items that are not there.
-fn check_asked(
-    context: &Context<'_>,
-    pipeline: &Pipeline,
-    numbered: &[Numbered<'_>],
-    n_items: u64,
-) -> Result<(), PipelineError> {
-    let Options { ref scope, to, .. } = *context.options;
-    let most_shards = numbered.iter().map(|numbered| numbered.unit.shards()).max().unwrap_or(0);
-    let (asked, what, n_there) = match scope {
-        Scope::Shard(shard) => (shard.to_string(), "shards", u64::from(most_shards)),
-        Scope::Items(ranges) => (ItemRanges(ranges.clone()).to_string(), "items", n_items),
-        _ => return Ok(()),
+fn begin_in_store(context: &Context<'_>, unit: &dyn Unit, plan: Plan) -> Result<StageReport, PipelineError> {
+    let is_begun = unit.dir(context.dir).plan()?.is_some();
+    settle(context, unit, plan)?;
+    let (status, reason) = match (is_begun, context.options.dry_run) {
+        (true, _) => (Status::UpToDate, "up to date"),
+        (false, true) => (Status::Needed, "nothing was there"),
+        (false, false) => (Status::Begun, "nothing was there"),
     };
-    let last_asked = match scope {
-        Scope::Shard(shard) => u64::from(*shard),
-        Scope::Items(ranges) => ranges.iter().map(|range| *range.end()).max().unwrap_or(0),
-        _ => 0,
-    };
-    if last_asked < n_there {
-        return Ok(());
-    }
-    let there = if n_there == 0 { format!("no {what}") } else { format!("{what} 0 to {}", n_there - 1) };
-    let (key, problem) = (scope.option().to_owned(), format!("is {asked}; {to} has {there}"));
-    Err(PipelineError::Value { path: pipeline.path.clone(), key, problem })
-}
-
-/// Items of one unit.
-struct Items<'a> {
-    context: &'a Context<'a>,
-    pipeline: &'a Pipeline,
-    numbered: &'a Numbered<'a>,
-}
-
-impl Items<'_> {
-    fn run(&self, shards: Vec<u32>) -> Result<Vec<StageReport>, PipelineError> {
-        let Self { context, numbered, .. } = self;
-        let (unit, options) = (numbered.unit.as_ref(), context.options);
-        let plan = match context.plan(unit) {
-            Err(PipelineError::Contract(missing @ ContractError::Unfinished { .. })) => {
-                return self.report_missing(&shards, &missing);
-            }
-            plan => plan?,
-        };
-        let job = Job::new(context, unit, plan, &[], options.force);
-        self.join(&job)?;
-        let mut reports = Vec::new();
-        let mut left = Vec::new();
-        for shard in shards {
-            match job.is_done(shard)? {
-                true => reports.push(self.report(shard, Status::UpToDate, "up to date")),
-                false if options.dry_run => reports.push(self.report(shard, Status::Needed, "not done yet")),
-                false => left.push(shard),
-            }
-        }
-        if !left.is_empty() {
-            let job = Job::new(context, unit, job.plan, &left, options.force);
-            reports.extend(self.work(&job, left)?);
-        }
-        reports.sort_by_key(|report| report.item);
-        Ok(reports)
-    }
-
-    /// What cannot be done before a stage that it reads: other units may have what they need.
-    fn report_missing(&self, shards: &[u32], missing: &ContractError) -> Result<Vec<StageReport>, PipelineError> {
-        let report = |&shard: &u32| match self.context.options.dry_run {
-            true => Ok(self.report(shard, Status::Needed, &missing.to_string())),
-            false => self.report_made(shard, Err(PipelineError::Inputs(missing.to_string()))),
-        };
-        shards.iter().map(report).collect()
-    }
-
-    /// Refuses a folder of another plan.
-    fn join(&self, job: &Job<'_>) -> Result<(), PipelineError> {
-        let own = job.dir.plan()?.and_then(|own| own.difference(&job.plan));
-        if let Some(difference) = own {
-            let again = format!("{difference}; ntp {} --begin --force begins anew", job.plan.stage);
-            return Err(ContractError::OtherPlan { path: job.dir.path().to_owned(), difference: again }.into());
-        }
-        if !self.context.options.dry_run && !self.numbered.unit.appears_whole() {
-            job.dir.join(&job.plan)?;
-        }
-        Ok(())
-    }
-
-    fn work(&self, job: &Job<'_>, shards: Vec<u32>) -> Result<Vec<StageReport>, PipelineError> {
-        let Self { context, pipeline, numbered } = self;
-        let unit = numbered.unit.as_ref();
-        let watch = Stopwatch::start();
-        let worked = self.attempt(job, &shards);
-        let commit = (context.options.commit)(&pipeline.path);
-        let measured = Measured { stage: unit.stage(), unit: &unit.name(), plan: &job.plan, commit };
-        measured.note(context.dir, watch.taken(), job.done())?;
-        let mut reports = Vec::new();
-        for (shard, made) in shards.into_iter().zip(worked) {
-            reports.push(self.report_made(shard, made)?);
-        }
-        Ok(reports)
-    }
-
-    /// Does shards; what comes of each.
-    fn attempt(&self, job: &Job<'_>, shards: &[u32]) -> Vec<Result<Option<Made>, PipelineError>> {
-        let unit = self.numbered.unit.as_ref();
-        let worker = match open(unit, job) {
-            Ok(worker) => worker,
-            Err(error) => return shards.iter().map(|_| Err(PipelineError::Inputs(error.to_string()))).collect(),
-        };
-        let run = |shard: u32| {
-            let made = run_shard(unit, job, worker.as_ref(), shard)?;
-            // What has one shard alone is finished with it.
-            if unit.shards() == 1 {
-                finish(unit, job, made.as_ref().and_then(|made| made.told.clone()))?;
-            }
-            Ok(made)
-        };
-        let worked = shards.to_vec().into_par_iter().map(run).collect();
-        if unit.shards() > 1 {
-            job.progress.finish(&format!("{} of {}", job.done().len(), counted(unit.shards(), "shard")));
-        }
-        worked
-    }
-
-    fn report_made(&self, shard: u32, made: Result<Option<Made>, PipelineError>) -> Result<StageReport, PipelineError> {
-        let (run, stage) = (self.context.dir, self.numbered.unit.stage());
-        let item = self.numbered.numbers.start + u64::from(shard);
-        match made {
-            Err(PipelineError::Interrupted) => Err(PipelineError::Interrupted),
-            Err(error) => {
-                let message = error.to_string();
-                let unit = self.numbered.unit.name();
-                let failure = Failure { item, unit, shard, message: message.clone(), attempts: 0, node: None };
-                failure.note(run, stage)?;
-                Ok(self.report(shard, Status::Failed, &message))
-            }
-            Ok(made) => {
-                Failure::forget(run, stage, item);
-                let reason = if made.is_some() { "done" } else { "another process was first" };
-                Ok(self.report(shard, Status::ShardDone, reason))
-            }
-        }
-    }
-
-    fn report(&self, shard: u32, status: Status, reason: &str) -> StageReport {
-        let item = Some(self.numbered.numbers.start + u64::from(shard));
-        let report = report_of(self.context, self.numbered.unit.as_ref(), status, reason.to_owned());
-        StageReport { item, shard: Some(shard), ..report }
-    }
+    Ok(report_of(context, unit, status, reason.to_owned()))
 }
 
 /// Commits every unit of a stage from its receipts; waits for those that are missing.
@@ -286,19 +197,19 @@ fn commit(context: &Context<'_>, numbered: &[Numbered<'_>], wait_secs: u64) -> R
 
 fn commit_unit(context: &Context<'_>, numbered: &Numbered<'_>) -> Result<StageReport, PipelineError> {
     let unit = numbered.unit.as_ref();
-    let plan = context.plan(unit)?;
+    let plan = plan_of(context, unit)?;
     let dir = unit.dir(context.dir);
     if let Some(difference) = dir.plan()?.and_then(|own| own.difference(&plan)) {
         return Err(ContractError::OtherPlan { path: dir.path().to_owned(), difference }.into());
     }
-    if why_needed(context, unit, &plan)?.is_none() {
+    if is_committed(context, unit, &plan)? {
         let manifest = dir.manifest()?;
         let (episodes, failed) = manifest.map_or((0, 0), |manifest| (manifest.episodes, manifest.failed));
         return Ok(StageReport { episodes, failed, ..report_of(context, unit, Status::UpToDate, "up to date".into()) });
     }
-    let missing: Vec<u64> =
-        dir.missing(&plan)?.into_iter().map(|shard| numbered.numbers.start + u64::from(shard)).collect();
+    let (receipts, missing) = receipts(context, &dir, &plan)?;
     if !missing.is_empty() {
+        let missing: Vec<u64> = missing.into_iter().map(|shard| numbered.numbers.start + u64::from(shard)).collect();
         let items: ItemRanges = missing.iter().copied().collect();
         let reason = format!("{} of {} missing: {items}", missing.len(), counted(unit.shards(), "item"));
         return Ok(StageReport { missing, ..report_of(context, unit, Status::Missing, reason) });
@@ -307,8 +218,29 @@ fn commit_unit(context: &Context<'_>, numbered: &Numbered<'_>) -> Result<StageRe
         return Ok(report_of(context, unit, Status::Needed, "not committed yet".to_owned()));
     }
     let job = Job::new(context, unit, plan, &[], false);
-    let tables = unit.gather(&job)?;
-    let manifest = dir.commit(&job.plan, &tables)?;
+    if let Some(stored) = Stored::of(context) {
+        let gathered = receipts.iter().flat_map(|receipt| &receipt.files).filter(|file| unit.gathers(&file.path));
+        stored.bring_files(&dir, &gathered.collect::<Vec<_>>())?;
+    }
+    let tables = unit.gather(&job, &receipts)?;
+    let manifest = dir.commit_receipts(&job.plan, receipts, &tables)?;
+    Stored::of(context).map_or(Ok(()), |stored| stored.keep_manifest(&dir, &manifest, &tables))?;
     let report = report_of(context, unit, Status::Done, "committed".to_owned());
     Ok(StageReport { episodes: manifest.episodes, failed: manifest.failed, ..report })
+}
+
+fn is_committed(context: &Context<'_>, unit: &dyn Unit, plan: &Plan) -> Result<bool, PipelineError> {
+    match Stored::of(context) {
+        Some(stored) => stored.is_committed(&unit.dir(context.dir)),
+        None => Ok(why_needed(context, unit, plan)?.is_none()),
+    }
+}
+
+/// The receipts of a plan, and the shards that have none.
+fn receipts(context: &Context<'_>, dir: &StageDir, plan: &Plan) -> Result<(Vec<Receipt>, Vec<u32>), PipelineError> {
+    let Some(stored) = Stored::of(context) else { return Ok(dir.receipts(plan)?) };
+    let shards: Vec<u32> = (0..plan.shards).collect();
+    let kept = stored.receipts(dir, plan, &shards)?;
+    let missing = shards.into_iter().filter(|shard| !kept.contains_key(shard)).collect();
+    Ok((kept.into_values().collect(), missing))
 }

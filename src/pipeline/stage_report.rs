@@ -16,9 +16,11 @@ pub enum Status {
     ShardDone,
     /// Its plan was written now, and nothing else done.
     Begun,
+    /// It was brought here from the store (with `--fetch`).
+    Fetched,
     /// Would be done (with `--dry-run`).
     Needed,
-    /// Shards are missing (with `--commit`).
+    /// Shards are missing (with `--commit`), or all of it (with `--fetch`).
     Missing,
     /// It failed; others were done.
     Failed,

@@ -8,7 +8,7 @@ use crate::artifact::{IoError, StageDir};
 use crate::dataset::{self, DatasetTrials, LearnedTrials, TrialData};
 use crate::model::{CONFIG_FILE, CoreKind, WEIGHTS_FILE};
 use crate::pipeline::layout::model_name;
-use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
+use crate::pipeline::unit::{Amount, Job, Looked, Made, Unit, Worker};
 use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, gallery, tasks};
 use crate::task::Split;
 use crate::training::{
@@ -129,6 +129,11 @@ impl Unit for Model<'_> {
     fn reads(&self, run: &RunDir) -> Vec<StageDir> {
         let datasets = self.experiments().into_iter().map(|pipeline| self.run_of(pipeline, run).dataset());
         datasets.chain(self.start(run)).collect()
+    }
+
+    fn looks_at(&self, run: &RunDir) -> Vec<Looked> {
+        let tasks = |pipeline| Looked::Files(self.run_of(pipeline, run).tasks());
+        self.experiments().into_iter().map(tasks).collect()
     }
 
     fn inputs(&self, run: &RunDir) -> Result<BTreeMap<String, String>, PipelineError> {

@@ -37,6 +37,11 @@ pub(super) trait Unit: Send + Sync {
     /// The folders that it reads.
     fn reads(&self, run: &RunDir) -> Vec<StageDir>;
 
+    /// What it looks at besides; its versions follow from what is read.
+    fn looks_at(&self, _run: &RunDir) -> Vec<Looked> {
+        Vec::new()
+    }
+
     /// What it reads: hash by the stage's name.
     ///
     /// # Errors
@@ -55,15 +60,30 @@ pub(super) trait Unit: Send + Sync {
     /// Reads what its shards share.
     fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError>;
 
-    /// Writes the files that are made of all shards together, and names them.
-    fn gather(&self, _job: &Job<'_>) -> Result<Vec<&'static str>, PipelineError> {
+    /// Writes the files that are made of all shards together, whose receipts are given, and names them.
+    fn gather(&self, _job: &Job<'_>, _receipts: &[Receipt]) -> Result<Vec<&'static str>, PipelineError> {
         Ok(Vec::new())
+    }
+
+    /// Whether a file of a shard is read by [`Unit::gather`].
+    fn gathers(&self, _file: &str) -> bool {
+        false
     }
 
     /// What was made, in words.
     fn told(&self, _manifest: &Manifest) -> String {
         "done".to_owned()
     }
+}
+
+/// A folder that is looked at.
+pub(super) enum Looked {
+    /// With all its files.
+    Files(StageDir),
+    /// At its plan and manifest alone.
+    Record(StageDir),
+    /// Small files of a folder of the run directory that is no stage's.
+    Notes(&'static str),
 }
 
 /// How much work something is.
@@ -202,6 +222,11 @@ impl<'a> Job<'a> {
             self.note_done(shard);
         }
         Ok(())
+    }
+
+    /// Notes that another process was first after all.
+    pub(super) fn note_lost(&self, shard: u32) {
+        self.done.lock().unwrap_or_else(PoisonError::into_inner).remove(&shard);
     }
 
     /// Notes that a shard was done here.

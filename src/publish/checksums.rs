@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::artifact::FileEntry;
 use crate::publish::PublishError;
-use crate::publish::destination::Destination;
+use crate::store::Store;
 
 /// Name of the file.
 pub(super) const FILE: &str = "SHA256SUMS";
@@ -72,7 +72,7 @@ pub(super) fn render(files: &[FileEntry]) -> String {
 /// # Errors
 ///
 /// [`PublishError::Unpublished`] when there is no `SHA256SUMS`; when the files cannot be listed.
-pub fn verify(copy: &dyn Destination) -> Result<Verified, PublishError> {
+pub fn verify(copy: &dyn Store) -> Result<Verified, PublishError> {
     let text = copy.read(FILE)?.ok_or_else(|| PublishError::Unpublished { path: copy.path(FILE) })?;
     let mut expected = BTreeMap::new();
     let mut verified = Verified::default();
@@ -95,7 +95,7 @@ pub fn verify(copy: &dyn Destination) -> Result<Verified, PublishError> {
             detail,
         }));
     }
-    for path in copy.list()? {
+    for path in copy.list("")? {
         if path != FILE && !expected.contains_key(&path) {
             let detail = String::new();
             verified.differences.push(FileDifference { path, difference: Difference::Extra, detail });
@@ -112,7 +112,7 @@ fn parse(line: &str) -> Option<(&str, &str)> {
     (is_hash && is_inside).then_some((sha256, path))
 }
 
-fn check(copy: &dyn Destination, path: &str, expected: &str) -> Option<(Difference, String)> {
+fn check(copy: &dyn Store, path: &str, expected: &str) -> Option<(Difference, String)> {
     match copy.sha256(path) {
         Ok(None) => Some((Difference::Missing, String::new())),
         Ok(Some(found)) if found.eq_ignore_ascii_case(expected) => None,

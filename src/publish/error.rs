@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::artifact::{ContractError, IoError};
 use crate::dataset::{DatasetError, Finding};
-use crate::feature::{Feature, NotBuiltIn};
+use crate::store::StoreError;
 use crate::table::TableError;
 
 /// A dataset that is not published.
@@ -37,16 +37,6 @@ pub enum PublishError {
         /// The file.
         path: PathBuf,
     },
-    /// What was written is not what was read.
-    #[error("{}: sha256 is {found} after copying, but should be {expected}", path.display())]
-    Copied {
-        /// The copy.
-        path: PathBuf,
-        /// Its hash.
-        found: String,
-        /// That of the original.
-        expected: String,
-    },
     /// A published folder would lie in the dataset, or the dataset in it.
     #[error("{} and {} lie in each other; publish into a folder beside the dataset", dataset.display(), to.display())]
     Nested {
@@ -69,34 +59,12 @@ pub enum PublishError {
         /// The checksums that are missing.
         path: PathBuf,
     },
-    /// A bucket cannot be reached by this program.
-    #[error("{url}: {}", NotBuiltIn(Feature::Cloud))]
-    NoCloud {
-        /// The bucket.
-        url: String,
-    },
-    /// A bucket whose store passes over conditions: two publications could mix in it.
-    #[error(
-        "{url}: its store does not keep to conditional writes (If-None-Match), so that two publications could mix; \
-         publish into a folder and copy that"
-    )]
-    NoConditionalWrites {
-        /// The bucket.
-        url: String,
-    },
-    /// A store refuses, or cannot be reached.
-    #[error("failed to {action} {}: {source}", place.display())]
-    Store {
-        /// What was tried.
-        action: &'static str,
-        /// With which object.
-        place: PathBuf,
-        /// What the store said.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
     /// The user pressed Ctrl-C; the same command goes on.
     #[error("interrupted; the same command carries on")]
     Interrupted,
+    /// The destination refuses, or spoils what is written.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// The dataset cannot be read.
     #[error(transparent)]
     Dataset(#[from] DatasetError),

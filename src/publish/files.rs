@@ -6,8 +6,7 @@ use std::path::Path;
 use crate::artifact::{FileEntry, StageDir, sha256_bytes};
 use crate::pipeline::Stage;
 use crate::publish::PublishError;
-use crate::publish::destination::{Creation, Destination};
-use crate::publish::folder::files_below;
+use crate::store::{Creation, Store, files_below};
 
 /// Folders of a dataset that has no manifest.
 const FOLDERS: [&str; 5] = ["annotations", "data", "meta", "ntp", "videos"];
@@ -40,40 +39,26 @@ pub(super) fn of_dataset(dataset: &Path) -> Result<Vec<FileEntry>, PublishError>
 }
 
 /// Refuses a destination in which something else lies.
-pub(super) fn check_destination(to: &dyn Destination, expected: &BTreeSet<&str>) -> Result<(), PublishError> {
-    match to.list()?.into_iter().find(|file| !expected.contains(file.as_str())) {
+pub(super) fn check_destination(to: &dyn Store, expected: &BTreeSet<&str>) -> Result<(), PublishError> {
+    match to.list("")?.into_iter().find(|file| !expected.contains(file.as_str())) {
         Some(file) => Err(PublishError::Foreign { path: to.path(&file) }),
         None => Ok(()),
     }
 }
 
 /// Brings a file of the dataset to the destination, unless it is there already, and reads it back.
-pub(super) fn copy(
-    dataset: &Path,
-    to: &dyn Destination,
-    file: &FileEntry,
-    moved: &mut Moved,
-) -> Result<(), PublishError> {
+pub(super) fn copy(dataset: &Path, to: &dyn Store, file: &FileEntry, moved: &mut Moved) -> Result<(), PublishError> {
     if is_there(to, file)? {
         moved.kept += 1;
         return Ok(());
     }
-    to.copy(&dataset.join(&file.path), &file.path)?;
-    let found = to.sha256(&file.path)?.unwrap_or_else(|| "of nothing".to_owned());
-    if found != file.sha256 {
-        return Err(PublishError::Copied { path: to.path(&file.path), found, expected: file.sha256.clone() });
-    }
+    to.keep(&dataset.join(&file.path), &file.path, &file.sha256)?;
     moved.copied += 1;
     Ok(())
 }
 
 /// Writes a document to the destination, unless it is there already.
-pub(super) fn write(
-    to: &dyn Destination,
-    path: &str,
-    content: &[u8],
-    moved: &mut Moved,
-) -> Result<FileEntry, PublishError> {
+pub(super) fn write(to: &dyn Store, path: &str, content: &[u8], moved: &mut Moved) -> Result<FileEntry, PublishError> {
     let entry = FileEntry { path: path.to_owned(), bytes: content.len() as u64, sha256: sha256_bytes(content) };
     match to.create(path, content)? {
         Creation::Stored => moved.copied += 1,
@@ -85,7 +70,7 @@ pub(super) fn write(
 
 /// Whether a file is there with its content. Files come under their names when they are whole, so one of other content
 /// is of another publication.
-fn is_there(to: &dyn Destination, file: &FileEntry) -> Result<bool, PublishError> {
+fn is_there(to: &dyn Store, file: &FileEntry) -> Result<bool, PublishError> {
     match to.sha256(&file.path)? {
         None => Ok(false),
         Some(found) if found == file.sha256 => Ok(true),

@@ -1,75 +1,12 @@
-//! Where publications are: a folder, or a bucket of an object store.
+//! Places as they are written: a folder, or `s3://BUCKET[/PREFIX]`.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::publish::PublishError;
-use crate::publish::folder::Folder;
+use crate::store::{Folder, Store, StoreError};
 
-/// A place that holds the files of one publication. Files are named relative to it, with `/`.
-pub trait Destination {
-    /// A file's name in messages.
-    fn path(&self, file: &str) -> PathBuf;
-
-    /// Every file, in order; none where nothing is there yet. Files on their way are not told.
-    ///
-    /// # Errors
-    ///
-    /// When they cannot be listed.
-    fn list(&self) -> Result<Vec<String>, PublishError>;
-
-    /// A small file; `None` when it is not there.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be read.
-    fn read(&self, file: &str) -> Result<Option<Vec<u8>>, PublishError>;
-
-    /// The SHA-256 of what is stored under a name, read back; `None` when nothing is.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be read.
-    fn sha256(&self, file: &str) -> Result<Option<String>, PublishError>;
-
-    /// Makes ready for files, and removes what a killed process left half-written.
-    ///
-    /// # Errors
-    ///
-    /// [`PublishError::NoConditionalWrites`] for a bucket without them; when nothing can be written.
-    fn prepare(&self) -> Result<(), PublishError>;
-
-    /// Stores a file that lies in a folder, whole or not at all. Nothing of its name is there.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be read or stored.
-    fn copy(&self, source: &Path, file: &str) -> Result<(), PublishError>;
-
-    /// Stores some bytes, whole or not at all, unless there is something of the name by then.
-    ///
-    /// # Errors
-    ///
-    /// When they cannot be stored.
-    fn create(&self, file: &str, content: &[u8]) -> Result<Creation, PublishError>;
-
-    /// The folder that it is, if it is one.
-    fn folder(&self) -> Option<&Path> {
-        None
-    }
-}
-
-/// What became of bytes that were to be stored under a new name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Creation {
-    /// They are stored.
-    Stored,
-    /// There is something of this name.
-    Taken,
-}
-
-/// Where a publication is, as it is written on the command line.
+/// A place as it is written on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A folder.
@@ -89,7 +26,7 @@ pub struct BucketUrl {
 
 /// A text is no place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{found:?} is no place for a publication; allowed: a folder, or s3://BUCKET[/PREFIX] without . and .. in it")]
+#[error("{found:?} is no place for files; allowed: a folder, or s3://BUCKET[/PREFIX] without . and .. in it")]
 pub struct NoPlace {
     found: String,
 }
@@ -134,15 +71,15 @@ impl Place {
     ///
     /// # Errors
     ///
-    /// [`PublishError::NoCloud`] for a bucket when the program was built without the feature `cloud`; when settings in
+    /// [`StoreError::NoCloud`] for a bucket when the program was built without the feature `cloud`; when settings in
     /// the environment contradict each other.
-    pub fn open(&self) -> Result<Box<dyn Destination>, PublishError> {
+    pub fn open(&self) -> Result<Box<dyn Store>, StoreError> {
         match self {
             Self::Folder(path) => Ok(Box::new(Folder::new(path))),
             #[cfg(feature = "cloud")]
-            Self::Bucket(url) => Ok(Box::new(crate::publish::Bucket::from_env(url)?)),
+            Self::Bucket(url) => Ok(Box::new(crate::store::Bucket::from_env(url)?)),
             #[cfg(not(feature = "cloud"))]
-            Self::Bucket(url) => Err(PublishError::NoCloud { url: url.to_string() }),
+            Self::Bucket(url) => Err(StoreError::NoCloud { url: url.to_string() }),
         }
     }
 }

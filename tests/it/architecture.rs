@@ -14,6 +14,7 @@ const ORDER: &[&str] = &[
     "scene",
     "program",
     "artifact",
+    "store",
     "table",
     "progress",
     "task",
@@ -53,8 +54,8 @@ const OWNERS: [(&str, &[&str]); 11] = [
     ("polars", &["report", "query"]),
     ("arrow", &["table", "dataset"]),
     ("parquet", &["table", "dataset"]),
-    ("object_store", &["publish/bucket"]),
-    ("tokio", &["publish/bucket"]),
+    ("object_store", &["store/bucket"]),
+    ("tokio", &["store/bucket"]),
 ];
 
 fn source_files() -> Vec<(String, String)> {

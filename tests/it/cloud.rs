@@ -1,6 +1,7 @@
-//! Publishing to a bucket: what lies there, what is refused, what an interruption leaves, and the check of a copy.
+//! Buckets: what lies there, what is refused, what an interruption of publishing leaves, and the check of a copy.
 //!
-//! The store is one in memory; `tests/foreign/bucket.sh` does the same with a server that speaks S3.
+//! The store is one in memory; `tests/foreign/bucket.sh` and `tests/cluster/bucket.sh` do the
+//! same with a server that speaks S3.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +11,8 @@ use std::sync::Arc;
 
 use futures_util::TryStreamExt as _;
 use futures_util::stream::BoxStream;
-use ntp::publish::{Bucket, BucketUrl, Creation, Destination as _, Difference, Folder, PublishError, publish, verify};
+use ntp::publish::{Difference, PublishError, publish, verify};
+use ntp::store::{Bucket, BucketUrl, Creation, Folder, Store as _, StoreError};
 use object_store::memory::InMemory;
 use object_store::path::Path as Location;
 use object_store::{
@@ -33,12 +35,12 @@ enum Fault {
 }
 
 #[derive(Debug)]
-struct Store {
+struct Faulty {
     inner: InMemory,
     fault: Fault,
 }
 
-impl fmt::Display for Store {
+impl fmt::Display for Faulty {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a store in memory")
     }
@@ -47,7 +49,7 @@ impl fmt::Display for Store {
 /// What `async fn` in the trait stands for.
 type Answer<'a, T> = Pin<Box<dyn Future<Output = Result<T>> + Send + 'a>>;
 
-impl ObjectStore for Store {
+impl ObjectStore for Faulty {
     fn put_opts<'s, 'l, 'a>(
         &'s self,
         location: &'l Location,
@@ -123,15 +125,15 @@ impl ObjectStore for Store {
     }
 }
 
-fn store(fault: Fault) -> Arc<Store> {
-    Arc::new(Store { inner: InMemory::new(), fault })
+fn store(fault: Fault) -> Arc<Faulty> {
+    Arc::new(Faulty { inner: InMemory::new(), fault })
 }
 
 fn url() -> BucketUrl {
     BucketUrl { bucket: "robots".to_owned(), prefix: "towers/six".to_owned() }
 }
 
-fn bucket(store: &Arc<Store>) -> Bucket {
+fn bucket(store: &Arc<Faulty>) -> Bucket {
     Bucket::new(&url(), Arc::clone(store) as Arc<dyn ObjectStore>).unwrap()
 }
 
@@ -140,7 +142,7 @@ fn wait<T>(answer: impl Future<Output = Result<T>>) -> T {
 }
 
 /// Every object with its bytes.
-fn objects(store: &Store) -> BTreeMap<String, Vec<u8>> {
+fn objects(store: &Faulty) -> BTreeMap<String, Vec<u8>> {
     wait(async {
         let found: Vec<ObjectMeta> = store.inner.list(None).try_collect().await?;
         let mut objects = BTreeMap::new();
@@ -152,17 +154,17 @@ fn objects(store: &Store) -> BTreeMap<String, Vec<u8>> {
     })
 }
 
-fn put(store: &Store, name: &str, content: &'static str) {
+fn put(store: &Faulty, name: &str, content: &'static str) {
     wait(store.inner.put(&Location::from(name), PutPayload::from_static(content.as_bytes())));
 }
 
-fn publish_to(place: &Place, store: &Arc<Store>) -> std::result::Result<ntp::publish::PublishSummary, PublishError> {
+fn publish_to(place: &Place, store: &Arc<Faulty>) -> std::result::Result<ntp::publish::PublishSummary, PublishError> {
     publish(&place.dataset, &bucket(store), &publication(), || true)
 }
 
 /// Every file below a folder with its bytes.
 fn files(root: &Path) -> BTreeMap<String, Vec<u8>> {
-    let names = Folder::new(root).list().unwrap();
+    let names = Folder::new(root).list("").unwrap();
     names.into_iter().map(|name| (format!("towers/six/{name}"), std::fs::read(root.join(&name)).unwrap())).collect()
 }
 
@@ -202,7 +204,7 @@ fn a_store_without_conditional_writes_is_refused_before_anything_is_written() {
     for fault in [Fault::PassesOverConditions, Fault::KnowsNoConditions] {
         let (place, store) = (place(), store(fault));
         let error = publish_to(&place, &store).unwrap_err();
-        assert!(matches!(error, PublishError::NoConditionalWrites { .. }), "{error}");
+        assert!(matches!(error, PublishError::Store(StoreError::NoConditionalWrites { .. })), "{error}");
         assert!(error.to_string().contains("s3://robots/towers/six"), "{error}");
         assert!(objects(&store).is_empty(), "{fault:?}");
     }
@@ -228,7 +230,7 @@ fn what_lies_there_is_never_overwritten() {
 fn what_a_store_spoils_is_found_by_reading_it_back_and_no_checksums_are_written() {
     let (place, store) = (place(), store(Fault::SpoilsTables));
     let error = publish_to(&place, &store).unwrap_err();
-    assert!(matches!(error, PublishError::Copied { .. }), "{error}");
+    assert!(matches!(error, PublishError::Store(StoreError::Spoiled { .. })), "{error}");
     assert!(!objects(&store).contains_key("towers/six/SHA256SUMS"));
 }
 
@@ -261,4 +263,45 @@ fn each_way_in_which_a_copy_in_a_bucket_differs_is_named() {
         ("stray.txt", Difference::Extra),
     ];
     assert_eq!(found, expected);
+}
+
+#[test]
+fn conditions_are_asked_for_by_many_at_once_and_a_store_without_them_is_refused() {
+    let good = store(Fault::None);
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| bucket(&good).check_conditions().unwrap());
+        }
+    });
+    assert!(objects(&good).is_empty());
+    for fault in [Fault::PassesOverConditions, Fault::KnowsNoConditions] {
+        let careless = store(fault);
+        let error = bucket(&careless).check_conditions().unwrap_err();
+        assert!(matches!(error, StoreError::NoConditionalWrites { .. }), "{error}");
+        assert!(objects(&careless).is_empty(), "{fault:?}");
+    }
+}
+
+#[test]
+fn files_of_a_folder_are_listed_read_together_and_brought_by_their_hashes() {
+    let (folder, store) = (tempfile::tempdir().unwrap(), store(Fault::None));
+    let bucket = bucket(&store);
+    for (name, content) in [("a/2", "two"), ("a/1", "one"), ("ab/3", "three")] {
+        assert_eq!(bucket.create(name, content.as_bytes()).unwrap(), Creation::Stored);
+    }
+    assert_eq!(bucket.list("a").unwrap(), ["a/1", "a/2"]);
+    assert_eq!(bucket.list("").unwrap(), ["a/1", "a/2", "ab/3"]);
+    assert!(bucket.list("b").unwrap().is_empty());
+    let names = ["ab/3", "c", "a/1"].map(str::to_owned);
+    assert_eq!(bucket.read_all(&names).unwrap(), [Some(b"three".to_vec()), None, Some(b"one".to_vec())]);
+    let to = folder.path().join("below/one");
+    bucket.fetch("a/1", &to, &ntp::artifact::sha256_bytes(b"one")).unwrap();
+    assert_eq!(std::fs::read(&to).unwrap(), b"one");
+    let error = bucket.fetch("a/2", &to, &ntp::artifact::sha256_bytes(b"one")).unwrap_err();
+    assert!(matches!(error, StoreError::Spoiled { .. }) && error.to_string().contains("towers/six/a/2"), "{error}");
+    assert_eq!(std::fs::read(&to).unwrap(), b"one");
+    assert_eq!(std::fs::read_dir(to.parent().unwrap()).unwrap().count(), 1, "something half-written is left");
+    assert!(bucket.fetch("c", &to, "").is_err());
+    bucket.replace("a/1", b"other").unwrap();
+    assert_eq!(bucket.read("a/1").unwrap(), Some(b"other".to_vec()));
 }

@@ -257,7 +257,7 @@ fn fuzz_checksum_files() {
     run(50, &changes_of_text(), |changes| {
         let bytes = changed(&sums, &changes);
         std::fs::write(folder.path().join("SHA256SUMS"), &bytes).unwrap();
-        let found = publish::verify(&publish::Folder::new(folder.path())).unwrap();
+        let found = publish::verify(&ntp::store::Folder::new(folder.path())).unwrap();
         let says_the_same =
             String::from_utf8_lossy(&bytes).trim_end().eq_ignore_ascii_case(String::from_utf8_lossy(&sums).trim_end());
         assert!(!found.differences.is_empty() || says_the_same, "{:?}", String::from_utf8_lossy(&bytes));

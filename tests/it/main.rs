@@ -97,6 +97,8 @@ mod sim;
 #[cfg(test)]
 mod smoke;
 #[cfg(test)]
+mod stored;
+#[cfg(test)]
 mod study;
 #[cfg(test)]
 mod table;

@@ -7,8 +7,9 @@ use arrow::array::{FixedSizeListArray, Float32Array};
 use arrow::datatypes::{DataType, Field};
 use ntp::dataset::edit::{Carry, Condition, EditError, SplitBy, Unit, diff, filter, merge, repair, split};
 use ntp::dataset::{Severity, play_back, summarize, validate};
-use ntp::publish::{Folder, Publication, publish};
+use ntp::publish::{Publication, publish};
 use ntp::query::{Tables, query};
+use ntp::store::Folder;
 use ntp::video::{Mp4Reader, VideoTrackFile};
 use serde_json::{Value, json};
 
