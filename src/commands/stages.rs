@@ -81,7 +81,7 @@ fn run_stages(
     let store = args.store.as_ref().map(Place::open).transpose()?;
     // What a dry run looks at in a store is no copy to be kept.
     let looked_at = store.as_ref().filter(|_| args.dry_run).map(|_| tempfile::tempdir()).transpose()?;
-    let out = looked_at.as_ref().map(|folder| folder.path()).or(args.out.as_deref());
+    let out = looked_at.as_ref().map(tempfile::TempDir::path).or(args.out.as_deref());
     let dir = RunDir::new(run_directory(out, &file));
     let options = Options {
         from,

