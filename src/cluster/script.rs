@@ -63,7 +63,7 @@ pub(super) fn submit(
         max_running: options.max_running.map(|most| most.to_string()).unwrap_or_default(),
         sbatch_args: options.sbatch_args.iter().map(|argument| shell_word(argument)).collect(),
         chains: chains.iter().map(chain).collect(),
-        store: about.store.as_deref().map(quoted).unwrap_or_default(),
+        store: about.store.as_deref().map(shell_word).unwrap_or_default(),
         study: match file {
             PipelineFile::Experiment(_) => String::new(),
             PipelineFile::Study(_) => place(&about.pipeline),
