@@ -110,6 +110,22 @@ table! {
         encoder: OptionalText later,
         /// which robot acts: `gripper`, `sawyer`, or what a robot of others calls itself; null in files that were written before there was an arm
         robot: OptionalText later,
+        /// how far the gripper opens at most, in metres; null where nobody knows it
+        jaw_m: OptionalFloat64 later,
+        /// where the camera stands that tells the robot and the model of the table: `front`, `right` or `above`; null where they know true places
+        camera: OptionalText later,
+        /// what the depths of that camera are like: `kinect` or `exact`
+        sensor: OptionalText later,
+        /// standard deviation of the error of that camera's turn about each axis, in degrees
+        calibration_deg: OptionalFloat64 later,
+        /// standard deviation of the error of its place along each axis, in millimetres
+        calibration_mm: OptionalFloat64 later,
+        /// standard deviation of what is added to all of its depths, in millimetres
+        depth_mm: OptionalFloat64 later,
+        /// level distance of what the model was told from true places, the mean over slots and decisions, in millimetres
+        localisation_mm: OptionalFloat64 later,
+        /// what a failure is due to: `ntp` (the first thing that went wrong is a decision), `localisation` (so it is, and the model decides rightly when it is told true places) or `manipulation` (no decision left the expert's before physics went wrong, or at all); null for a success
+        failure: OptionalText later,
     }
 }
 
@@ -217,5 +233,13 @@ fn row<'a>(suite: &'a str, facts: &'a SuiteFacts, by: &Acted, rollout: &'a Rollo
         scoping: part(|model| model.scoping),
         encoder: part(|model| model.encoder),
         robot: Some(facts.robot.as_str().into()),
+        jaw_m: None,
+        camera: None,
+        sensor: None,
+        calibration_deg: None,
+        calibration_mm: None,
+        depth_mm: None,
+        localisation_mm: None,
+        failure: None,
     }
 }
