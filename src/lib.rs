@@ -27,6 +27,7 @@ pub mod expert;
 pub mod ingest;
 pub mod lineage;
 pub mod model;
+pub mod perception;
 pub mod pipeline;
 pub mod publish;
 #[cfg(feature = "query")]

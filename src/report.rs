@@ -27,6 +27,7 @@ mod metrics;
 mod order;
 mod page;
 mod paper;
+mod robot_table;
 mod rollouts;
 mod section;
 mod summary;
@@ -40,6 +41,7 @@ pub use filmstrip::{Filmstrip, Shows, StripPicture};
 pub use interval::{student, wilson};
 pub use metrics::MetricsInput;
 pub use paper::{PaperValue, paper_values};
+pub use robot_table::{PaperRobot, RobotRow, Share};
 pub use rollouts::RolloutsInput;
 pub use summary::{
     Aggregate, AnnotationResult, Divergence, Fact, FirstError, InputFile, ModelSummary, Report, StageCost, SuiteResult,
@@ -184,6 +186,7 @@ pub fn make(inputs: &ReportInputs, out: &Path) -> Result<Report, ReportError> {
         notes: claims::notes(&aggregates),
         figures: figures::figures(&aggregates),
         grids: figures::grids(&aggregates),
+        robot_table: robot_table::rows(&aggregates),
         aggregates,
         detections: detections::read(&inputs.detections, &rollouts.results)?,
         annotations: inputs.annotations.iter().map(annotation).collect::<Result<_, _>>()?,

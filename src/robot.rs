@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::program::Program;
 use crate::scene::{BodyIndex, Scene, SceneState, SlotIndex};
 use crate::task::{Layout, UnknownName};
-use crate::trace::{Cause, Frame, Push};
+use crate::trace::{Cause, Frame, Observation, Push};
 
 /// Which robot acts.
 #[derive(
@@ -140,7 +140,17 @@ pub trait RobotApi {
     /// As [`RobotApi::settle`].
     fn carry(&mut self, tray: BodyIndex) -> Result<SceneState, Cause>;
 
-    /// The last boundary frame: what a program sees.
+    /// What a policy is told of the last boundary frame: where things are, or where a robot that sees takes them to be.
+    fn observe(&self) -> Observation {
+        self.now().observation()
+    }
+
+    /// Whether that is what the robot sees, and not where things are.
+    fn is_told_what_it_sees(&self) -> bool {
+        false
+    }
+
+    /// The last boundary frame.
     fn now(&self) -> &Frame {
         let frames = self.frames();
         &frames[frames.len() - 1]

@@ -18,6 +18,7 @@
 
 mod act;
 mod adversary;
+mod belief;
 mod carry;
 mod check;
 mod clock;
@@ -41,10 +42,11 @@ pub use error::SimError;
 use crate::geometry::yaw_rad;
 use crate::robot::{Action, RobotApi, RobotKind};
 use crate::scene::{BodyIndex, Scene, SceneState, locked_bodies};
-use crate::trace::{Cause, Frame, Push};
+use crate::trace::{Cause, Frame, Observation, Push};
 
 use act::Air;
 use adversary::Adversary;
+use belief::Sight;
 use clock::Clock;
 use engine_shape::{IntoEngine as _, from_engine};
 use gripper::Gripper;
@@ -73,6 +75,10 @@ pub struct Simulation {
     /// Lost on the way in this action.
     dropped: Option<BodyIndex>,
     adversary: Option<Adversary>,
+    /// What the robot sees; without it, it knows where everything is.
+    sight: Option<Sight>,
+    /// Whether arm or palm have touched something in this action.
+    touched: bool,
 }
 
 impl Simulation {
@@ -87,7 +93,7 @@ impl Simulation {
         let (mover, tool) = start(initial, config);
         check::check(&scene, initial, &tool)?;
         let mut world = World::new(&scene, initial, config);
-        let gripper = Gripper::new(&mut world, tool);
+        let gripper = Gripper::new(&mut world, tool, config.jaw_m());
         let links = mover.stance().map(|stance| Links::new(&mut world, stance.posture));
         let gripper = if links.is_some() { gripper.below_arm() } else { gripper };
         let clock = Clock::new(config.step_hz, config.frame_hz);
@@ -105,6 +111,8 @@ impl Simulation {
             lift_off_z: None,
             dropped: None,
             adversary: None,
+            sight: None,
+            touched: false,
         };
         simulation.come_to_rest();
         simulation.clock = clock;
@@ -113,10 +121,14 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// The bodies that the slots show now.
+    /// The bodies that the slots show now, as far as the robot knows.
     fn locked(&self) -> Vec<BodyIndex> {
+        self.locked_in(&self.believed_state())
+    }
+
+    fn locked_in(&self, state: &SceneState) -> Vec<BodyIndex> {
         let before = self.frames.last().map(|frame| frame.slots.as_slice());
-        locked_bodies(&self.scene, &self.state(), before)
+        locked_bodies(&self.scene, state, before)
     }
 
     /// One step along a way, in free flight where nothing else can happen, else in the engine.
@@ -171,6 +183,7 @@ impl Simulation {
             links.drive(&mut self.world, before.posture, now.posture);
         }
         self.world.step();
+        self.touched = self.touched || self.sees() && self.has_touched();
         self.drop_what_slipped();
     }
 
@@ -178,6 +191,7 @@ impl Simulation {
         if !self.gripper.has_slipped(&self.world) {
             return;
         }
+        self.leave();
         if let Some(body) = self.gripper.let_go(&mut self.world) {
             Gripper::part_from(&mut self.world, body);
             self.dropped = Some(body);
@@ -217,7 +231,7 @@ impl Simulation {
     fn record(&mut self, boundary: bool) {
         let time_nanos = self.clock.time_nanos();
         let state = self.state();
-        let slots = locked_bodies(&self.scene, &state, self.frames.last().map(|frame| frame.slots.as_slice()));
+        let slots = if self.sees() { self.locked() } else { self.locked_in(&state) };
         let frame = Frame { time_nanos, boundary, state, slots };
         match self.frames.last_mut() {
             Some(last) if last.time_nanos == time_nanos => *last = frame,
@@ -228,17 +242,18 @@ impl Simulation {
 
 /// What moves the gripper and where that is when the episode begins: an arm is at home.
 fn start(initial: &SceneState, config: &SimulationConfig) -> (Mover, Tool) {
+    let opening_m = initial.opening_m.min(config.jaw_m());
     match config.robot {
         RobotKind::Gripper => {
             let tool = Tool {
                 position: initial.gripper_in_world.translation.vector.into_engine(),
                 yaw_rad: yaw_rad(&initial.gripper_in_world),
-                opening_m: initial.opening_m,
+                opening_m,
             };
             (Mover::Free, tool)
         }
         RobotKind::Sawyer => {
-            let (stance, tool) = Stance::home(initial.opening_m);
+            let (stance, tool) = Stance::home(opening_m);
             (Mover::Arm(stance), tool)
         }
     }
@@ -272,20 +287,35 @@ impl RobotApi for Simulation {
     fn act(&mut self, action: Action) -> Result<(), Cause> {
         let before_nanos = self.clock.time_nanos();
         let held_before = self.gripper.held.map(|held| held.body);
-        self.dropped = None;
+        (self.dropped, self.touched) = (None, false);
         let performed = self.perform(action);
+        let touched = self.touched;
         if self.clock.time_nanos() == before_nanos {
             self.wait();
         }
         let broken = self.judge(held_before);
         let released = held_before.filter(|_| action == Action::Release && self.gripper.held.is_none());
         let pushed = released.and_then(|body| self.disturb(body));
+        self.look();
         self.record(true);
         let pushed_off = pushed.as_ref().is_some_and(|pushed| pushed.fell_off).then_some(Cause::PushedOffTable);
         pushed.into_iter().for_each(|pushed| self.tell(pushed));
         let dropped = self.dropped.map(|_| Cause::DroppedObject);
-        let own = gravest(broken, gravest(dropped, performed.err()));
+        let collided = touched.then_some(Cause::Collided);
+        let own = gravest(broken, gravest(dropped, gravest(performed.err(), collided)));
         gravest(own, pushed_off).map_or(Ok(()), Err)
+    }
+
+    fn observe(&self) -> Observation {
+        let now = self.now();
+        if !self.sees() {
+            return now.observation();
+        }
+        Frame { state: self.believed_state(), ..now.clone() }.observation()
+    }
+
+    fn is_told_what_it_sees(&self) -> bool {
+        self.sees()
     }
 
     fn pushes(&self) -> Option<&[Push]> {

@@ -58,6 +58,8 @@ impl Recorded<'_> {
             demonstrated: range(&first.demonstration.provenance.counts),
             on_table: range(&first.counts),
             bowls: None,
+            jaw_m: None,
+            perception: None,
             robot: self.session.robot(),
         }
     }

@@ -6,6 +6,7 @@ use crate::rollout::SuiteFacts;
 /// The facts that stand in each row of a suite's rollouts.
 pub(super) fn of_suite(spec: &PipelineSpec, suite: &SuiteSpec) -> SuiteFacts {
     let family = spec.tasks.family;
+    let simulation = suite.simulation(&spec.generate.simulation);
     let ends = |counts: CountsSpec| family.max_instances().map(|_| [counts.min, counts.max]);
     SuiteFacts {
         family,
@@ -16,6 +17,8 @@ pub(super) fn of_suite(spec: &PipelineSpec, suite: &SuiteSpec) -> SuiteFacts {
         demonstrated: ends(suite.demonstrated()),
         on_table: ends(suite.on_table.unwrap_or(suite.demonstrated())),
         bowls: suite.bowls,
-        robot: suite.simulation(&spec.generate.simulation).robot.name().to_owned(),
+        robot: simulation.robot.name().to_owned(),
+        jaw_m: Some(simulation.jaw_m()),
+        perception: suite.perception.clone(),
     }
 }

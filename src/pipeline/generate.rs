@@ -7,14 +7,16 @@ use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, Manifest, StageDir};
 use crate::expert;
+use crate::perception::{Perception, PerceptionConfig};
 use crate::pipeline::recorded::GenerateSettings;
 use crate::pipeline::trials::trial;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{Pipeline, PipelineError, RecordedFrames, RunDir, Stage, tasks};
 use crate::recording::ShardWriter;
+use crate::robot::RobotApi as _;
 use crate::seed::Seed;
 use crate::sim::{AdversaryConfig, SimError, Simulation, SimulationConfig};
-use crate::task::{self, Task, Trial};
+use crate::task::{self, Family, Task, Trial};
 use crate::trace::{Actor, Episode, Provenance};
 use crate::words::counted;
 
@@ -174,4 +176,16 @@ pub(super) fn disturbed(
         Some(config) => world.with_adversary(config, trial.derive("adversary", &[])),
         None => Ok(world),
     }
+}
+
+/// The same world with a robot that sees, if there is to be one: what is off depends on the trial's seed.
+pub(super) fn perceiving(
+    world: Simulation,
+    perception: Option<&PerceptionConfig>,
+    family: Family,
+    trial: Seed,
+) -> Result<Simulation, SimError> {
+    let Some(config) = perception else { return Ok(world) };
+    let perception = Perception::new(config, family, world.scene(), trial)?;
+    Ok(world.with_perception(perception))
 }

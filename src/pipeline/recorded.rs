@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::artifact::Plan;
 use crate::model::Decoder;
+use crate::perception::PerceptionConfig;
 use crate::pipeline::{GenerateSpec, Stage, SuiteSpec};
 use crate::render::CameraConfig;
 use crate::sim::{AdversaryConfig, SimulationConfig};
@@ -61,6 +62,11 @@ impl Recorded {
     /// The physics in which they were acted: a suite may name another robot than the demonstrations'.
     pub fn acted_in(&self) -> SimulationConfig {
         self.suite.as_ref().map_or_else(|| self.simulation.clone(), |suite| suite.simulation(&self.simulation))
+    }
+
+    /// The camera that told the robot where things are, if there was one.
+    pub fn perception(&self) -> Option<&PerceptionConfig> {
+        self.suite.as_ref()?.perception.as_ref()
     }
 
     /// The suite's adversary, if it had one.

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 
 use crate::artifact;
 use crate::model::Decoder;
+use crate::perception::PerceptionConfig;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::task::{Family, Split};
@@ -237,18 +238,24 @@ impl Pipeline {
             return Err(self.value(&key("split"), "is unseen, but tasks.unseen is 0"));
         }
         if let Err(problem) = suite.simulation(&self.spec.generate.simulation).check() {
-            return Err(self.value(&key("layout"), problem.to_string()));
+            let field = if suite.jaw_m.is_some() && problem.is_of("jaw_m") { "jaw_m" } else { "layout" };
+            return Err(self.value(&key(field), problem.to_string()));
+        }
+        if let Some(Err(problem)) = suite.perception.as_ref().map(PerceptionConfig::check) {
+            return Err(self.value(&key("perception"), problem.to_string()));
         }
         if let Err(problem) = suite.noise.check() {
             return Err(self.value(&key("noise"), problem.to_string()));
         }
         let sees = |model: &&ModelSpec| model.variant.sees() && model.acts(&suite.name);
-        if let Some(model) = self.spec.models.iter().find(sees).filter(|_| !suite.noise.is_none()) {
+        let of_positions = [("noise", !suite.noise.is_none()), ("perception", suite.perception.is_some())];
+        let asked = of_positions.into_iter().find(|&(_, is_asked)| is_asked);
+        if let Some((model, (field, _))) = self.spec.models.iter().find(sees).zip(asked) {
             let problem = format!(
                 "is of positions, but {} sees and acts it; allowed are models that read positions",
                 model.variant
             );
-            return Err(self.value(&key("noise"), problem));
+            return Err(self.value(&key(field), problem));
         }
         self.check_towers(&key, suite)?;
         self.check_counts(&key("demonstrated"), suite.demonstrated)?;

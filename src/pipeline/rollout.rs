@@ -10,7 +10,7 @@ use crate::artifact::{FileEntry, Manifest, Receipt, StageDir};
 use crate::model::{ComputeDevice, Decoder, ModelConfig, Variant, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
-use crate::pipeline::generate::{disturbed, simulation_config, world};
+use crate::pipeline::generate::{disturbed, perceiving, simulation_config, world};
 use crate::pipeline::recorded::RolloutSettings;
 use crate::pipeline::train::{self, Model};
 use crate::pipeline::trials::trial;
@@ -30,7 +30,7 @@ use crate::task::{Split, Task, TaskSet};
 use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
 
 /// Raised when the same settings act otherwise, or tell more of it.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Episodes that act side by side and are committed together.
 const EPISODES_PER_SHARD: u32 = 25;
 /// Failures of a suite that a report shows; so many of each shard are recorded, wherever they are.
@@ -337,6 +337,7 @@ impl Acting<'_> {
         let config = simulation_config(recorded, &spec.simulation(&pipeline.spec.generate.simulation));
         let provenance = Provenance::new(task, &own, Actor::Policy(String::new()), u64::from(episode));
         let world = disturbed(world(task, &own, &config)?, spec.adversary, own.seed)?;
+        let world = perceiving(world, spec.perception.as_ref(), task.family, own.seed)?;
         let sight = self.sight(&demonstration, &world, own.seed)?;
         Ok(Start { task, demonstration, world: Box::new(world), sight, provenance })
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::ConvertConfig;
 use crate::model::{CoreKind, Decoder, EncoderKind, ScopingKind, Variant};
+use crate::perception::PerceptionConfig;
 use crate::render::CameraConfig;
 use crate::robot::RobotKind;
 use crate::sim::{AdversaryConfig, SimulationConfig};
@@ -254,6 +255,13 @@ pub struct SuiteSpec {
     /// How things are laid out where the robot acts: `table` or `bench`; as its robot needs it when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
+    /// How far the gripper opens at most where it acts, in metres, 0.01 to 0.07; that of `generate.simulation` when left
+    /// out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jaw_m: Option<f32>,
+    /// A depth camera that tells robot and model where things are; they know it exactly when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perception: Option<PerceptionConfig>,
 }
 
 impl SuiteSpec {
@@ -261,7 +269,8 @@ impl SuiteSpec {
     pub fn simulation(&self, demonstrated: &SimulationConfig) -> SimulationConfig {
         let robot = self.robot.unwrap_or(demonstrated.robot);
         let layout = self.layout.or(if self.robot.is_none() { demonstrated.layout } else { None });
-        SimulationConfig { robot, layout, ..demonstrated.clone() }
+        let jaw_m = self.jaw_m.or(demonstrated.jaw_m);
+        SimulationConfig { robot, layout, jaw_m, ..demonstrated.clone() }
     }
 }
 

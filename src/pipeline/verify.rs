@@ -7,7 +7,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::artifact::Plan;
-use crate::pipeline::generate::disturbed;
+use crate::pipeline::generate::{disturbed, perceiving};
 use crate::pipeline::{PipelineError, Recorded};
 use crate::robot::{Action, RobotApi as _};
 use crate::sim::Simulation;
@@ -68,7 +68,8 @@ pub fn verify(plan: &Plan, episode: &Episode) -> Result<Verification, PipelineEr
     let scene = task::scene_on(layout, provenance.family, &provenance.counts);
     let initial = task::initial_state_on(layout, provenance.family, &scene, provenance.trial().seed);
     let world = Simulation::new(scene, &initial, &config)?;
-    let mut world = disturbed(world, adversary, provenance.trial().seed)?;
+    let world = disturbed(world, adversary, provenance.trial().seed)?;
+    let mut world = perceiving(world, recorded.perception(), provenance.family, provenance.trial().seed)?;
     for call in episode.calls.iter() {
         if let Some(action) = Action::new(call.program, call.argument) {
             // What goes wrong in physics went wrong the first time too; the frames tell.

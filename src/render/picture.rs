@@ -68,7 +68,7 @@ pub struct Picture {
     pub width: u32,
     /// In pixels.
     pub height: u32,
-    /// Red, green, blue (sRGB) of each pixel: `[height, width, 3]`.
+    /// Red, green, blue (sRGB) of each pixel: `[height, width, 3]`; empty where only depths were drawn.
     pub rgb: Vec<u8>,
     /// Distance along the camera's axis in metres, `[height, width]`; infinite where there is nothing.
     pub depth_m: Vec<f32>,

@@ -4,13 +4,13 @@ use crate::arm::links_in_world;
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::render::camera::Camera;
 use crate::render::look::Look;
-use crate::render::mesh::Mesh;
+use crate::render::mesh::{Face, Mesh};
 use crate::render::model::{ArmPart, Model};
 use crate::render::picture::{Picture, Segment};
-use crate::render::raster::{NOTHING, Raster};
+use crate::render::raster::{Affine, NOTHING, Raster};
 use crate::render::shade::{Drawn, Palette, Prepared, Shader};
 use crate::render::shadow::ShadowMap;
-use crate::render::view::{NEAR_M, View, clip_near};
+use crate::render::view::{NEAR_M, Sight, View, clip_near};
 use crate::scene::{BodyIndex, Scene, SceneState};
 
 /// The most samples across a pixel.
@@ -73,10 +73,7 @@ impl Renderer {
     /// Draws a scene at one instant as a camera sees it. The picture is the same for the same arguments and look,
     /// whatever was drawn before.
     pub fn draw(&mut self, scene: &Scene, state: &SceneState, camera: &Camera) -> &Picture {
-        let (_, model) = match self.model.take() {
-            Some(kept) if kept.0 == *scene => self.model.insert(kept),
-            _ => self.model.insert((scene.clone(), Model::new(scene, &self.look))),
-        };
+        let model = kept(&mut self.model, scene, &self.look);
         let samples = self.look.samples.clamp(1, MAX_SAMPLES);
         let things = things(model, state);
         let to_sun = *self.shader.to_sun();
@@ -95,6 +92,31 @@ impl Renderer {
         self.frame.color(&self.shader, &view, samples as usize, &mut self.picture);
         &self.picture
     }
+
+    /// Depths and segments alone, as [`Renderer::draw`] has them with one sample a pixel; without colours it is many
+    /// times faster.
+    pub fn draw_depths(&mut self, scene: &Scene, state: &SceneState, camera: &Camera) -> &Picture {
+        let things = things(kept(&mut self.model, scene, &self.look), state);
+        let view = view(camera, state, 1);
+        self.frame.raster.clear(camera.width as usize, camera.height as usize, 0.0);
+        things.iter().for_each(|thing| self.frame.cover(&view, thing));
+        self.picture.resize(camera.width, camera.height);
+        self.picture.rgb.clear();
+        let Raster { nearness, owner, .. } = &self.frame.raster;
+        self.picture.depth_m.iter_mut().zip(nearness).for_each(|(depth, nearness)| *depth = 1.0 / nearness);
+        let number = |&owner: &u32| if owner == NOTHING { Segment::Background.number() } else { owner as u16 };
+        self.picture.segments.iter_mut().zip(owner).for_each(|(segment, owner)| *segment = number(owner));
+        &self.picture
+    }
+}
+
+/// The meshes of a scene: those that were kept, if they are of it.
+fn kept<'m>(model: &'m mut Option<(Scene, Model)>, scene: &Scene, look: &Look) -> &'m Model {
+    let (_, model) = match model.take() {
+        Some(kept) if kept.0 == *scene => model.insert(kept),
+        _ => model.insert((scene.clone(), Model::new(scene, look))),
+    };
+    model
 }
 
 /// One rigid thing in the world.
@@ -135,6 +157,23 @@ fn things<'m>(model: &'m Model, state: &SceneState) -> Vec<Thing<'m>> {
         .collect()
 }
 
+/// A thing before the camera.
+struct Seen {
+    sight: Sight,
+    rotation: nalgebra::Rotation3<f32>,
+    origin: Vec3,
+}
+
+impl Seen {
+    /// `None` when it is behind the camera.
+    fn of(view: &View, thing: &Thing<'_>) -> Option<Self> {
+        let sight = view.sight(&thing.in_world);
+        let origin = sight.in_camera.translation.vector;
+        let is_before = origin.z + thing.mesh.radius_m >= NEAR_M;
+        is_before.then(|| Self { rotation: sight.in_camera.rotation.to_rotation_matrix(), origin, sight })
+    }
+}
+
 fn view(camera: &Camera, state: &SceneState, samples: u32) -> View {
     let scale = samples as f32;
     View {
@@ -147,32 +186,41 @@ fn view(camera: &Camera, state: &SceneState, samples: u32) -> View {
 impl Frame {
     /// Rasterises the faces of a thing that look at the camera.
     fn add(&mut self, view: &View, thing: &Thing<'_>, shader: &Shader) {
-        let sight = view.sight(&thing.in_world);
-        if sight.in_camera.translation.z + thing.mesh.radius_m < NEAR_M {
-            return;
-        }
-        let rotation = sight.in_camera.rotation.to_rotation_matrix();
-        let origin = sight.in_camera.translation.vector;
+        let Some(seen) = Seen::of(view, thing) else { return };
         for face in &thing.mesh.faces {
-            let above = face.normal.dot(&sight.eye) - face.offset;
-            if above < EDGE_ON_M {
-                continue;
-            }
-            self.corners.clear();
-            self.corners
-                .extend(thing.mesh.corners[face.corners.clone()].iter().map(|corner| rotation * corner + origin));
-            clip_near(&mut self.corners, &mut self.scratch);
-            if self.corners.len() < 3 {
-                continue;
-            }
-            self.polygon.clear();
-            self.polygon.extend(self.corners.iter().map(|corner| view.project(corner)));
-            let nearness = view.slope(&(rotation * face.normal / -above));
+            let Some(nearness) = self.outline(view, thing.mesh, face, &seen) else { continue };
             let owner = self.faces.len() as u32;
             self.raster.fill(&self.polygon, &nearness, owner);
-            let shaded = shader.prepare(view, &sight, &thing.in_world, face, &mut self.n_palettes);
+            let shaded = shader.prepare(view, &seen.sight, &thing.in_world, face, &mut self.n_palettes);
             self.faces.push(shaded.of(thing.segment.number()));
         }
+    }
+
+    /// The same without light: who is nearest is told by the number of its segment.
+    fn cover(&mut self, view: &View, thing: &Thing<'_>) {
+        let Some(seen) = Seen::of(view, thing) else { return };
+        for face in &thing.mesh.faces {
+            let Some(nearness) = self.outline(view, thing.mesh, face, &seen) else { continue };
+            self.raster.fill(&self.polygon, &nearness, u32::from(thing.segment.number()));
+        }
+    }
+
+    /// Puts a face's outline in the picture into `polygon`; gives its nearness, or nothing where it is not seen.
+    fn outline(&mut self, view: &View, mesh: &Mesh, face: &Face, seen: &Seen) -> Option<Affine> {
+        let above = face.normal.dot(&seen.sight.eye) - face.offset;
+        if above < EDGE_ON_M {
+            return None;
+        }
+        self.corners.clear();
+        self.corners
+            .extend(mesh.corners[face.corners.clone()].iter().map(|corner| seen.rotation * corner + seen.origin));
+        clip_near(&mut self.corners, &mut self.scratch);
+        if self.corners.len() < 3 {
+            return None;
+        }
+        self.polygon.clear();
+        self.polygon.extend(self.corners.iter().map(|corner| view.project(corner)));
+        Some(view.slope(&(seen.rotation * face.normal / -above)))
     }
 
     /// Colours, depths and segments of all pixels.

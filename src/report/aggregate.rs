@@ -24,11 +24,10 @@ fn aggregate(seeds: &[SuiteResult]) -> Aggregate {
     let episodes = seeds.iter().map(|seed| seed.episodes).sum();
     let successes = seeds.iter().map(|seed| seed.successes).sum();
     let (wilson_low, wilson_high) = wilson(successes, episodes);
-    let mut causes = BTreeMap::new();
-    for (cause, count) in seeds.iter().flat_map(|seed| &seed.causes) {
-        *causes.entry(cause.clone()).or_default() += count;
-    }
-    let goals_met: Option<Vec<f64>> = seeds.iter().map(|seed| seed.goals_met).collect();
+    let mean = |share: fn(&SuiteResult) -> Option<f64>| {
+        let shares: Option<Vec<f64>> = seeds.iter().map(share).collect();
+        shares.map(|shares| shares.iter().sum::<f64>() / shares.len() as f64)
+    };
     // Where seeds differ in what they were asked, nothing is known of it.
     let facts = seeds.iter().all(|seed| seed.facts == seeds[0].facts).then(|| seeds[0].facts.clone());
     Aggregate {
@@ -45,10 +44,21 @@ fn aggregate(seeds: &[SuiteResult]) -> Aggregate {
         seeds_high: of_seeds.map(|(_, high)| high),
         wilson_low,
         wilson_high,
-        goals_met: goals_met.map(|shares| shares.iter().sum::<f64>() / shares.len() as f64),
-        causes,
+        goals_met: mean(|seed| seed.goals_met),
+        causes: counts(seeds, |seed| &seed.causes),
+        failures: counts(seeds, |seed| &seed.failures),
+        localisation_mm: mean(|seed| seed.localisation_mm),
         pushes: sum(|seed| seed.pushes),
         toppled: sum(|seed| seed.toppled),
         paper_success_rate: None,
     }
+}
+
+/// Counts of all seeds together.
+fn counts(seeds: &[SuiteResult], of: fn(&SuiteResult) -> &BTreeMap<String, u64>) -> BTreeMap<String, u64> {
+    let mut sums = BTreeMap::new();
+    for (name, count) in seeds.iter().flat_map(of) {
+        *sums.entry(name.clone()).or_default() += count;
+    }
+    sums
 }

@@ -1,5 +1,7 @@
 //! `results.csv` and `curves.csv`: the figures as tables, by Polars.
 
+use std::collections::BTreeMap;
+
 use polars::prelude::{CsvWriter, DataFrame, SerWriter as _, df};
 
 use crate::report::ReportError;
@@ -10,7 +12,8 @@ use crate::report::summary::SuiteResult;
 /// Digits behind the point: finer than any interval, coarse enough to read.
 const PRECISION: usize = 6;
 
-/// One row for each actor, suite and training seed; causes as `name=count` with `;` between.
+/// One row for each actor, suite and training seed; causes and what failures are due to as `name=count`
+/// with `;` between.
 pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
     let text = |of: fn(&SuiteResult) -> &str| results.iter().map(of).collect::<Vec<_>>();
     let maybe = |of: fn(&SuiteResult) -> Option<&str>| results.iter().map(of).collect::<Vec<_>>();
@@ -18,8 +21,9 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
     let share = |of: fn(&SuiteResult) -> Option<f64>| results.iter().map(of).collect::<Vec<_>>();
     let fact = |of: fn(&SuiteFacts) -> Option<i64>| results.iter().map(|result| of(&result.facts)).collect::<Vec<_>>();
     let whole = |of: fn(&SuiteResult) -> u64| results.iter().map(of).collect::<Vec<_>>();
-    let cause = |(cause, count): (&String, &u64)| format!("{cause}={count}");
-    let causes = |result: &SuiteResult| result.causes.iter().map(cause).collect::<Vec<_>>().join(";");
+    let told = |counts: &BTreeMap<String, u64>| {
+        counts.iter().map(|(name, count)| format!("{name}={count}")).collect::<Vec<_>>().join(";")
+    };
     let table = df!(
         "experiment" => text(|result| &result.actor.experiment),
         "variant" => text(|result| &result.actor.variant),
@@ -51,7 +55,9 @@ pub(super) fn results(results: &[SuiteResult]) -> Result<Vec<u8>, ReportError> {
         "wilson_low" => real(|result| result.wilson_low),
         "wilson_high" => real(|result| result.wilson_high),
         "goals_met" => share(|result| result.goals_met),
-        "causes" => results.iter().map(causes).collect::<Vec<_>>(),
+        "causes" => results.iter().map(|result| told(&result.causes)).collect::<Vec<_>>(),
+        "failures" => results.iter().map(|result| told(&result.failures)).collect::<Vec<_>>(),
+        "localisation_mm" => share(|result| result.localisation_mm),
         "mean_calls" => real(|result| result.mean_calls),
         "mean_sim_secs" => real(|result| result.mean_sim_secs),
         "pushes" => results.iter().map(|result| result.pushes).collect::<Vec<_>>(),

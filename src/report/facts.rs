@@ -4,6 +4,7 @@ use polars::prelude::DataType;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::perception::PerceptionConfig;
 use crate::report::ReportError;
 use crate::report::frames::Rows;
 use crate::robot::RobotKind;
@@ -16,7 +17,7 @@ pub(super) const OBJECT_SORTING: &str = "object_sorting";
 pub(super) const TABLE_CLEANUP: &str = "table_cleanup";
 
 /// The columns of [`SuiteFacts`].
-pub(super) const COLUMNS: [(&str, DataType); 13] = [
+pub(super) const COLUMNS: [(&str, DataType); 19] = [
     ("split", DataType::String),
     ("family", DataType::String),
     ("blocks", DataType::Int64),
@@ -30,10 +31,19 @@ pub(super) const COLUMNS: [(&str, DataType); 13] = [
     ("bowls", DataType::Int64),
     ("objects", DataType::Int64),
     ("robot", DataType::String),
+    ("jaw_m", DataType::Float64),
+    ("camera", DataType::String),
+    ("sensor", DataType::String),
+    ("calibration_deg", DataType::Float64),
+    ("calibration_mm", DataType::Float64),
+    ("depth_mm", DataType::Float64),
 ];
 
 /// What a file does not say of itself: how far positions were off.
 pub(super) const NOISE: [&str; 2] = ["noise_frame_m", "noise_offset_m"];
+
+/// How far the gripper opens where nothing is said of it, in metres.
+const USUAL_JAW_M: f64 = 0.07;
 
 /// What a suite asks for. A fact is null where the suite has no such thing, where its episodes differ in it, and where
 /// it was not written down: then `family` is null too.
@@ -68,6 +78,24 @@ pub struct SuiteFacts {
     /// Which robot acts, where it is not the gripper that flies freely.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
+    /// How far its gripper opens at most, in metres, where it is not the usual one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jaw_m: Option<f64>,
+    /// Where a camera stands that tells robot and model where things are; null where they know it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// What its depths are like: `kinect` or `exact`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<String>,
+    /// Standard deviation of the error of its turn about each axis, in degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration_deg: Option<f64>,
+    /// Standard deviation of the error of its place along each axis, in millimetres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration_mm: Option<f64>,
+    /// Standard deviation of what is added to all of its depths, in millimetres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
     /// Standard deviation of the error of each observed position, anew in each observation, in metres; null without noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_frame_m: Option<f64>,
@@ -101,7 +129,9 @@ impl SuiteFacts {
         let real =
             |name: &str| Ok::<_, ReportError>(same(rows.optional_real(name)?, rows.optional_real(&highest(name))?));
         let (mut split, mut family, mut order) = (text("split")?, text("family")?, text("order")?);
-        let mut robot = text("robot")?;
+        let (mut robot, mut camera, mut sensor) = (text("robot")?, text("camera")?, text("sensor")?);
+        let (jaw_m, depth_mm) = (real("jaw_m")?, real("depth_mm")?);
+        let (calibration_deg, calibration_mm) = (real("calibration_deg")?, real("calibration_mm")?);
         let (probability, impulse) = (real("adversary_probability")?, real("adversary_impulse_ns")?);
         let (demonstrated_min, demonstrated_max) = (whole("demonstrated_min")?, whole("demonstrated_max")?);
         let (on_table_min, on_table_max) = (whole("on_table_min")?, whole("on_table_max")?);
@@ -123,15 +153,22 @@ impl SuiteFacts {
             objects_min: objects_min[row],
             objects_max: objects_max[row],
             robot: robot[row].take().filter(|robot| robot != RobotKind::default().name()),
+            jaw_m: jaw_m[row].filter(|jaw_m| *jaw_m != USUAL_JAW_M),
+            camera: camera[row].take(),
+            sensor: sensor[row].take(),
+            calibration_deg: calibration_deg[row],
+            calibration_mm: calibration_mm[row],
+            depth_mm: depth_mm[row],
             noise_frame_m: noise_frame_m[row].filter(|noise| *noise > 0.0),
             noise_offset_m: noise_offset_m[row].filter(|noise| *noise > 0.0),
         };
         Ok((0..blocks.len()).map(facts).collect())
     }
 
-    /// Which part of the paper's experiments it is, as far as it is known; `None` with another robot than they have.
+    /// Which part of the paper's experiments it is, as far as it is known; `None` with another robot than they
+    /// have, or one that has to see.
     pub(super) fn ask(&self) -> Option<Ask> {
-        if self.robot.is_some() {
+        if self.robot.is_some() || self.camera.is_some() || self.jaw_m.is_some() {
             return None;
         }
         let split = self.split.as_deref()?;
@@ -179,6 +216,34 @@ impl SuiteFacts {
         [self.noise_frame_m, self.noise_offset_m].map(|noise| noise.map_or(0, |noise| (1000.0 * noise).round() as i64))
     }
 
+    /// How far the gripper opens at most, in millimetres.
+    pub(super) fn jaw_mm(&self) -> i64 {
+        (1000.0 * self.jaw_m.unwrap_or(USUAL_JAW_M)).round() as i64
+    }
+
+    /// The errors of a camera whose turn, place and depths are off in the proportion of a well calibrated one, in percent
+    /// of that one's.
+    pub(super) fn calibration_percent(&self) -> Option<i64> {
+        let usual = PerceptionConfig::default();
+        let pairs = [
+            (self.calibration_deg?, usual.calibration_deg),
+            (self.calibration_mm?, usual.calibration_mm),
+            (self.depth_mm?, usual.depth_mm),
+        ];
+        let [deg, mm, depth] = pairs.map(|(found, usual)| (100.0 * found / f64::from(usual)).round() as i64);
+        (deg == mm && mm == depth).then_some(deg)
+    }
+
+    /// The camera and its errors in a few words; nothing without one.
+    pub(super) fn camera_words(&self) -> Option<String> {
+        let camera = self.camera.as_deref()?;
+        let errors = [(self.calibration_deg, "\u{b0}"), (self.calibration_mm, " mm"), (self.depth_mm, " mm in depth")];
+        let errors: Vec<String> =
+            errors.into_iter().filter_map(|(error, unit)| Some(format!("{}{unit}", error?))).collect();
+        let exact = if self.sensor.as_deref() == Some("exact") { ", exact depths" } else { "" };
+        Some(format!("{camera} camera off by {}{exact}", errors.join(", ")))
+    }
+
     /// In a few words: `Block Stacking, 4 blocks, unseen tasks, a push at 25 %`. Empty where nothing is known.
     pub(super) fn words(&self) -> String {
         let Some(family) = &self.family else { return String::new() };
@@ -191,6 +256,8 @@ impl SuiteFacts {
         let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
         words.extend(push.map(|(percent, mns)| format!("a push of {mns} mN\u{202f}s at {percent} %")));
         words.extend(self.robot.as_deref().map(|robot| format!("acted by {}", capitalized(robot))));
+        words.extend(self.camera_words().map(|camera| format!("seen by a {camera}")));
+        words.extend(self.jaw_m.map(|_| format!("a gripper that opens {} mm", self.jaw_mm())));
         let [frame, offset] = self.noise_mm();
         words.extend((frame > 0).then(|| format!("positions off by {frame} mm")));
         words.extend((offset > 0).then(|| format!("positions always off by {offset} mm")));

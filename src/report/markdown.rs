@@ -3,9 +3,10 @@
 mod glance;
 
 use crate::report::chart::distinct;
-use crate::report::chart::scale::short;
+use crate::report::chart::scale::{percent, short};
 use crate::report::claims::{Claim, Note, Verdict};
 use crate::report::detections::DetectionError;
+use crate::report::robot_table::{PaperRobot, RobotRow, Share};
 use crate::report::section::annotations::{self, LevelRow};
 use crate::report::section::models::{self, ModelRow};
 use crate::report::summary::{Aggregate, FirstError, Report};
@@ -39,6 +40,7 @@ pub(super) fn render(report: &Report) -> String {
         }
     };
     put(&COLUMNS, report.aggregates.iter().map(row).collect());
+    put(&ROBOT_COLUMNS, report.robot_table.iter().map(robot).collect());
     put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
     put(&ANNOTATION_COLUMNS, annotations::rows(&report.annotations).into_iter().map(annotation).collect());
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
@@ -49,6 +51,41 @@ pub(super) fn render(report: &Report) -> String {
         report.notes.iter().for_each(|said| text.push_str(&note(said)));
     }
     text
+}
+
+const ROBOT_COLUMNS: [Column<'static>; 9] = [
+    ("robot table", false),
+    ("model", false),
+    ("trials", true),
+    ("success", true),
+    ("NTP failures", true),
+    ("seen wrongly", true),
+    ("manipulation failures", true),
+    ("goals met", true),
+    ("paper: success, NTP, manipulation", false),
+];
+
+fn robot(row: &RobotRow) -> Vec<String> {
+    let told = |share: Share| {
+        let [rate, low, high] = [share.rate, share.wilson_low, share.wilson_high].map(percent);
+        format!("{rate} % ({low} to {high})")
+    };
+    let maybe = |share: Option<Share>| share.map_or_else(none, told);
+    let paper = |paper: PaperRobot| {
+        let shares = [paper.success, paper.ntp, paper.manipulation].map(percent);
+        format!("{} % of {}", shares.join(", "), paper.trials)
+    };
+    vec![
+        row.suite.clone(),
+        row.model.clone(),
+        row.episodes.to_string(),
+        told(row.success),
+        maybe(row.ntp),
+        maybe(row.localisation),
+        maybe(row.manipulation),
+        row.goals_met.map_or_else(none, |share| format!("{} %", percent(share))),
+        row.paper.map_or_else(none, paper),
+    ]
 }
 
 const ANNOTATION_COLUMNS: [Column<'static>; 9] = [

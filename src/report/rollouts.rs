@@ -43,12 +43,14 @@ const COLUMNS: [(&str, DataType); 17] = [
 ];
 
 /// Columns that files of earlier versions lack, beside those of [`facts::COLUMNS`].
-const LATER: [(&str, DataType); 5] = [
+const LATER: [(&str, DataType); 7] = [
     ("goals", DataType::Int64),
     ("goals_met", DataType::Int64),
     ("core", DataType::String),
     ("scoping", DataType::String),
     ("encoder", DataType::String),
+    ("localisation_mm", DataType::Float64),
+    ("failure", DataType::String),
 ];
 
 /// What a file does not say of itself: to which experiment it belongs.
@@ -59,6 +61,7 @@ const TAG: &str = "tag";
 const ACTOR: [&str; 9] =
     [EXPERIMENT, "variant", "core", "scoping", "encoder", TAG, "train_tasks", "specification", "decoder"];
 const MICROS_PER_SEC: f64 = 1e6;
+const MICROS_PER_MILLI: f64 = 1e3;
 const MILLIONTHS: i64 = 1_000_000;
 
 /// The rollouts of one model in one suite.
@@ -169,6 +172,8 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         col("toppled").sum(),
         col("goals_met").count().alias("judged"),
         met.sum().alias("met"),
+        col("localisation_mm").count().alias("localised"),
+        (col("localisation_mm") * lit(MICROS_PER_MILLI) + lit(0.5)).cast(DataType::Int64).sum().alias("off_micros"),
     ];
     for name in facts::COLUMNS.into_iter().map(|(name, _)| name).chain(facts::NOISE) {
         sums.extend([col(name).min(), col(name).max().alias(facts::highest(name))]);
@@ -182,8 +187,10 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
     let (successes, calls, micros) = (rows.whole("successes")?, rows.whole("calls")?, rows.whole("sim_micros")?);
     let (disturbed, pushes, toppled) = (rows.whole("disturbed")?, rows.whole("pushes")?, rows.whole("toppled")?);
     let (judged, met) = (rows.whole("judged")?, rows.whole("met")?);
+    let (localised, off_micros) = (rows.whole("localised")?, rows.whole("off_micros")?);
     let facts = SuiteFacts::read(&rows)?;
-    let mut causes = causes(all, paths)?;
+    let mut causes = counts(all, "outcome", paths)?;
+    let mut failures = counts(all, "failure", paths)?;
     let mut results = Vec::with_capacity(table.height());
     for (row, (actor, facts)) in actors(&rows)?.into_iter().zip(facts).enumerate() {
         let (suite, seed) = (suites[row].clone(), seeds[row]);
@@ -195,6 +202,7 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
         let (wilson_low, wilson_high) = wilson(successes[row] as u64, episodes[row] as u64);
         results.push(SuiteResult {
             causes: causes.remove(&(actor.clone(), suite.clone(), seed)).unwrap_or_default(),
+            failures: failures.remove(&(actor.clone(), suite.clone(), seed)).unwrap_or_default(),
             actor,
             suite,
             facts,
@@ -205,6 +213,8 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
             wilson_low,
             wilson_high,
             goals_met: (judged[row] > 0).then(|| met[row] as f64 / MILLIONTHS as f64 / judged[row] as f64),
+            localisation_mm: (localised[row] > 0)
+                .then(|| off_micros[row] as f64 / MICROS_PER_MILLI / localised[row] as f64),
             mean_calls: calls[row] as f64 / n,
             mean_sim_secs: micros[row] as f64 / MICROS_PER_SEC / n,
             pushes: (disturbed[row] > 0).then_some(pushes[row] as u64),
@@ -217,21 +227,22 @@ fn results(all: &LazyFrame, paths: &[PathBuf]) -> Result<Vec<SuiteResult>, Repor
     Ok(results)
 }
 
-type Causes = BTreeMap<(Actor, String, i64), BTreeMap<String, u64>>;
+type Counts = BTreeMap<(Actor, String, i64), BTreeMap<String, u64>>;
 
-fn causes(all: &LazyFrame, paths: &[PathBuf]) -> Result<Causes, ReportError> {
-    let failures = all.clone().filter(col("success").not());
-    let counts = failures.group_by(key(&["suite", "training_seed", "outcome"])).agg([len().alias("episodes")]);
-    let table = collect(counts, paths)?;
+/// How many failures have each value of a column.
+fn counts(all: &LazyFrame, column: &str, paths: &[PathBuf]) -> Result<Counts, ReportError> {
+    let failures = all.clone().filter(col("success").not().and(col(column).is_not_null()));
+    let query = failures.group_by(key(&["suite", "training_seed", column])).agg([len().alias("episodes")]);
+    let table = collect(query, paths)?;
     let rows = Rows(&table);
     let (suites, seeds) = (rows.text("suite")?, rows.whole("training_seed")?);
-    let (outcomes, episodes) = (rows.text("outcome")?, rows.whole("episodes")?);
-    let mut causes = Causes::new();
+    let (values, episodes) = (rows.text(column)?, rows.whole("episodes")?);
+    let mut counts = Counts::new();
     for (row, actor) in actors(&rows)?.into_iter().enumerate() {
-        let counts = causes.entry((actor, suites[row].clone(), seeds[row])).or_default();
-        counts.insert(outcomes[row].clone(), episodes[row] as u64);
+        let counts = counts.entry((actor, suites[row].clone(), seeds[row])).or_default();
+        counts.insert(values[row].clone(), episodes[row] as u64);
     }
-    Ok(causes)
+    Ok(counts)
 }
 
 /// A failed rollout's first error is its first departure from the expert, unless physics went wrong before, or nothing

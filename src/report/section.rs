@@ -11,6 +11,7 @@ mod headline;
 mod learning;
 pub(in crate::report) mod models;
 mod results;
+mod robot_table;
 mod run;
 mod success;
 
@@ -40,9 +41,10 @@ pub(super) struct Contents<'a> {
 }
 
 /// In their order on the page.
-pub(super) const SECTIONS: [Section; 12] = [
+pub(super) const SECTIONS: [Section; 13] = [
     headline::SECTION,
     claims::SECTION,
+    robot_table::SECTION,
     figures::SECTION,
     success::SECTION,
     filmstrips::SECTION,

@@ -17,6 +17,7 @@ use crate::report::detections::DetectionError;
 use crate::report::facts::SuiteFacts;
 use crate::report::figures::{Figure, Grid};
 use crate::report::filmstrip::Filmstrip;
+use crate::report::robot_table::RobotRow;
 
 /// Version of the file.
 pub(super) const SCHEMA_VERSION: u32 = 2;
@@ -42,6 +43,9 @@ pub struct Report {
     pub figures: Vec<Figure>,
     /// Table Clean-up by bowls and forks.
     pub grids: Vec<Grid>,
+    /// The paper's table of a real robot from these results; absent where no robot has to see.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robot_table: Vec<RobotRow>,
     /// Where rollouts first decided otherwise than the expert.
     pub divergences: Vec<Divergence>,
     /// What failed rollouts did wrong first.
@@ -107,6 +111,13 @@ pub struct SuiteResult {
     pub goals_met: Option<f64>,
     /// Failures by cause.
     pub causes: BTreeMap<String, u64>,
+    /// Failures by what they are due to: `ntp`, `localisation`, `manipulation`. Absent where that was not told.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub failures: BTreeMap<String, u64>,
+    /// Level distance of what the model was told from true places, the mean over rollouts, in millimetres; absent where
+    /// it was told true ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub localisation_mm: Option<f64>,
     /// Program calls a rollout, on average.
     pub mean_calls: f64,
     /// Simulated seconds a rollout, on average.
@@ -152,6 +163,13 @@ pub struct Aggregate {
     pub goals_met: Option<f64>,
     /// Failures by cause.
     pub causes: BTreeMap<String, u64>,
+    /// Failures by what they are due to: `ntp`, `localisation`, `manipulation`. Absent where that was not told.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub failures: BTreeMap<String, u64>,
+    /// Level distance of what the model was told from true places, the mean over rollouts, in millimetres; absent where
+    /// it was told true ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub localisation_mm: Option<f64>,
     /// An adversary's pushes in all rollouts; null in a suite without one.
     pub pushes: Option<u64>,
     /// The bodies that they toppled.

@@ -1,6 +1,7 @@
 //! What a suite and a model are, as columns of `rollouts.parquet`: no reader takes it from their names.
 
 use crate::model::Variant;
+use crate::perception::PerceptionConfig;
 use crate::scene::{Mobility, Scene};
 use crate::task::Family;
 
@@ -23,6 +24,10 @@ pub struct SuiteFacts {
     pub on_table: Option<[u16; 2]>,
     /// Which robot acts; of others what it calls itself.
     pub robot: String,
+    /// How far its gripper opens at most, in metres; `None` where nobody knows it.
+    pub jaw_m: Option<f32>,
+    /// The camera that tells robot and model where things are; `None` where they know it.
+    pub perception: Option<PerceptionConfig>,
     /// Bowls that each task asks for; `None` where tasks differ in that, or ask for none.
     pub bowls: Option<u16>,
 }

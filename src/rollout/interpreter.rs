@@ -11,7 +11,8 @@ use crate::model::{Pictures, ScopingKind};
 use crate::program::Program;
 use crate::robot::{Action, Judgement, RobotApi, judge};
 use crate::rollout::divergence::divergence;
-use crate::rollout::{Decision, Divergence, Expectation, Policy, PolicyError, Query, Specification};
+use crate::rollout::failure::{Asked, Localisation, due_to};
+use crate::rollout::{Decision, Divergence, Expectation, Failure, Policy, PolicyError, Query, Specification};
 use crate::scene::Scene;
 use crate::task::Task;
 use crate::trace::{
@@ -81,6 +82,11 @@ pub struct RolloutEpisode {
     pub pushes: Option<Vec<Push>>,
     /// How many goals of the task hold in the end, also where the policy never ended.
     pub judgement: Judgement,
+    /// What a failure is due to; `None` for a success.
+    pub failure: Option<Failure>,
+    /// Level distance of what the policy was told from true places, the mean over slots and decisions, in millimetres;
+    /// `None` where it was told true ones.
+    pub localisation_mm: Option<f64>,
 }
 
 /// Episodes that cannot be acted.
@@ -108,7 +114,9 @@ pub fn run(
     let mut running: Vec<Running<'_>> =
         starts.into_iter().map(|start| Running::new(start, policy.scoping(), policy.reads(), limits)).collect();
     loop {
-        let queries: Vec<Query> = running.iter().enumerate().filter_map(|(idx, run)| run.query(idx)).collect();
+        let asking = running.iter_mut().enumerate();
+        let queries: Vec<Query> =
+            asking.filter_map(|(idx, run)| run.query(idx).inspect(|query| run.note(query))).collect();
         if queries.is_empty() {
             break;
         }
@@ -123,7 +131,7 @@ pub fn run(
         running.par_iter_mut().for_each(Running::step);
     }
     let variant = policy.name().to_owned();
-    Ok(running.into_iter().map(|run| run.finish(&variant)).collect::<Result<_, TraceError>>()?)
+    running.into_iter().map(|run| run.finish(&variant, policy)).collect()
 }
 
 /// One episode on its way.
@@ -141,6 +149,10 @@ struct Running<'t> {
     limits: Limits,
     decisions: u32,
     first_divergence: Option<Divergence>,
+    /// What it was asked until then, where it is told what the robot sees.
+    asked: Asked,
+    /// What that was off by.
+    localisation: Localisation,
     /// What first went wrong in physics, at which decision.
     first_fault: Option<(u32, Cause)>,
     /// Why it was given up before its end.
@@ -174,6 +186,8 @@ impl<'t> Running<'t> {
             expectation,
             decisions: 0,
             first_divergence: None,
+            asked: Asked::default(),
+            localisation: Localisation::default(),
             first_fault: None,
             given_up: None,
             unlawful: None,
@@ -191,9 +205,19 @@ impl<'t> Running<'t> {
             specification: Arc::clone(&self.specification),
             window: top.output.unwrap_or(top.input),
             program: top.program,
-            observation: self.world.now().observation(),
+            observation: self.world.observe(),
             seen: Arc::clone(&self.seen),
         })
+    }
+
+    /// Notes what is asked, and how far off it is.
+    fn note(&mut self, query: &Query) {
+        if self.world.is_told_what_it_sees() {
+            self.localisation.add(&query.observation, &self.world.now().observation());
+            if self.first_divergence.is_none() {
+                self.asked.note(query.clone());
+            }
+        }
     }
 
     /// Carries out the pending decision.
@@ -232,9 +256,13 @@ impl<'t> Running<'t> {
     /// Compares the call just made with the expert's, until one differs.
     fn compare(&mut self, caller: Program) {
         if self.first_divergence.is_none() {
-            let wanted = self.expectation.next(&self.world.now().observation());
+            let observation = self.world.now().observation();
+            let wanted = self.expectation.next(&observation);
             let made = self.calls.top();
             self.first_divergence = made.and_then(|made| divergence(self.decisions, caller, made, wanted.as_ref()));
+            if self.first_divergence.is_some() {
+                self.asked.diverged(wanted.as_ref(), observation);
+            }
         }
     }
 
@@ -250,9 +278,9 @@ impl<'t> Running<'t> {
         (self.world.frames().len() as u32).saturating_sub(1)
     }
 
-    fn finish(mut self, variant: &str) -> Result<RolloutEpisode, TraceError> {
+    fn finish(mut self, variant: &str, policy: &mut dyn Policy) -> Result<RolloutEpisode, RolloutError> {
         if let Some(unlawful) = self.unlawful {
-            return Err(unlawful);
+            return Err(unlawful.into());
         }
         let judgement = judge(self.task, self.world.as_mut());
         let lost = judgement.cause.filter(|&cause| cause == Cause::RobotLost);
@@ -272,13 +300,20 @@ impl<'t> Running<'t> {
             pushes: self.world.pushes().unwrap_or_default().to_vec(),
             outcome,
         })?;
+        let fault_decision = self.first_fault.map(|(decision, _)| decision);
+        let failure = (!outcome.is_success()).then(|| {
+            let right = || self.asked.is_right_when_told(policy);
+            due_to(self.first_divergence.map(|divergence| divergence.decision), fault_decision, right)
+        });
         Ok(RolloutEpisode {
             episode,
             decisions: self.decisions,
             first_divergence: self.first_divergence,
-            fault_decision: self.first_fault.map(|(decision, _)| decision),
+            fault_decision,
             pushes: self.world.pushes().map(<[Push]>::to_vec),
             judgement,
+            failure: failure.transpose()?,
+            localisation_mm: self.localisation.mean_mm(),
         })
     }
 }

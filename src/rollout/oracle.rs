@@ -6,13 +6,14 @@ use crate::rollout::{Decision, Expectation, Policy, PolicyError, Query, Start};
 /// Knows for each episode what the expert would call next. What is knocked over it builds again.
 #[derive(Clone, Debug, Default)]
 pub struct Oracle {
+    beginnings: Vec<Expectation>,
     expectations: Vec<Expectation>,
 }
 
 impl Oracle {
     /// For episodes `0..expectations.len()`.
     pub fn new(expectations: Vec<Expectation>) -> Self {
-        Self { expectations }
+        Self { beginnings: expectations.clone(), expectations }
     }
 
     /// For the episodes of [`super::run`] with the same starts.
@@ -24,7 +25,13 @@ impl Oracle {
     }
 
     fn decide_one(&mut self, query: &Query) -> Decision {
-        let expectation = self.expectations.get_mut(query.episode);
+        let Self { beginnings, expectations } = self;
+        let mut expectation = expectations.get_mut(query.episode);
+        if let (Some(expectation), Some(beginning), 0) =
+            (&mut expectation, beginnings.get(query.episode), query.decision)
+        {
+            expectation.clone_from(beginning);
+        }
         match expectation.and_then(|expectation| expectation.next(&query.observation)) {
             Some(call) => Decision {
                 program: call.program,

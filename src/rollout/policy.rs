@@ -94,7 +94,7 @@ pub trait Policy {
     }
 
     /// One decision a query, in order. Must not depend on which queries come together, but may on earlier ones of the
-    /// same running call.
+    /// same episode, which a query with decision 0 begins anew.
     ///
     /// # Errors
     ///

@@ -188,10 +188,20 @@ impl RolloutRows {
 }
 
 fn row<'a>(suite: &'a str, facts: &'a SuiteFacts, by: &Acted, rollout: &'a RolloutEpisode) -> Row<'a> {
-    let RolloutEpisode { episode, decisions, first_divergence, fault_decision, pushes, judgement } = rollout;
+    let RolloutEpisode {
+        episode,
+        decisions,
+        first_divergence,
+        fault_decision,
+        pushes,
+        judgement,
+        failure,
+        localisation_mm,
+    } = rollout;
     let end = |range: Option<[u16; 2]>, at: usize| range.map(|range| i64::from(range[at]));
     let part = |get: fn(&ModelFacts) -> &'static str| by.model.as_ref().map(|model| get(model).into());
     let n_toppled = |pushes: &Vec<Push>| pushes.iter().map(|push| push.toppled.len()).sum::<usize>() as i64;
+    let perception = facts.perception.as_ref();
     let provenance = &episode.provenance;
     let last_nanos = episode.frames.last().map_or(0, |frame| frame.time_nanos);
     Row {
@@ -233,13 +243,13 @@ fn row<'a>(suite: &'a str, facts: &'a SuiteFacts, by: &Acted, rollout: &'a Rollo
         scoping: part(|model| model.scoping),
         encoder: part(|model| model.encoder),
         robot: Some(facts.robot.as_str().into()),
-        jaw_m: None,
-        camera: None,
-        sensor: None,
-        calibration_deg: None,
-        calibration_mm: None,
-        depth_mm: None,
-        localisation_mm: None,
-        failure: None,
+        jaw_m: facts.jaw_m.map(decimal),
+        camera: perception.map(|perception| perception.camera.name().into()),
+        sensor: perception.map(|perception| perception.sensor.name().into()),
+        calibration_deg: perception.map(|perception| decimal(perception.calibration_deg)),
+        calibration_mm: perception.map(|perception| decimal(perception.calibration_mm)),
+        depth_mm: perception.map(|perception| decimal(perception.depth_mm)),
+        localisation_mm: *localisation_mm,
+        failure: failure.map(|failure| failure.name().into()),
     }
 }

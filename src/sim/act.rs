@@ -1,6 +1,6 @@
 //! The three actions of the robot API, as motions of the gripper.
 
-use rapier3d::math::{Pose as EnginePose, Rotation, Vector};
+use rapier3d::math::{Rotation, Vector};
 
 use crate::arm::{Obstacles, Solid};
 use crate::robot::{Action, HOVER_M};
@@ -8,7 +8,7 @@ use crate::scene::{BodyIndex, Mobility, SlotIndex};
 use crate::sim::Simulation;
 use crate::sim::drop_spot;
 use crate::sim::grasp::{self, Grasp};
-use crate::sim::gripper::{Gripper, MAX_OPENING_M, PALM_M, TIP_M};
+use crate::sim::gripper::{Gripper, PALM_M, TIP_M};
 use crate::sim::motion::Tool;
 use crate::sim::mover::{Around, MARGIN_M, Stance, Transit, Way, in_base};
 use crate::sim::sweep::AtStart;
@@ -67,7 +67,11 @@ impl Simulation {
     fn move_to(&mut self, slot: SlotIndex) -> Result<(), Cause> {
         let goal = self.goal(slot)?;
         self.cross(&goal)?;
-        self.sink(goal.hover_z, CLEARANCE_M)
+        if self.sees() {
+            return self.sink_freely(goal.hover_z);
+        }
+        self.sink(goal.hover_z, CLEARANCE_M)?;
+        Ok(())
     }
 
     /// Where `move_to` leads to now.
@@ -75,12 +79,14 @@ impl Simulation {
         let Some(&body) = self.locked().get(usize::from(slot.0)) else {
             return Err(Cause::UnknownSlot);
         };
-        let target = self.body_in_world(body).translation;
+        if !self.knows(body) {
+            return Err(Cause::NotSeen);
+        }
+        let target = self.believed(body).translation;
         let hover_z = target.z + self.scene.body(body).shape.rim_m().unwrap_or(0.0) + HOVER_M;
-        let held = self.gripper.held_handle();
         let lowest_z = self.gripper.lowest_z(&self.world);
         let below_m = self.gripper.tool.position.z - lowest_z;
-        let transit_z = (self.world.top_z(held) + below_m + CLEARANCE_M).max(hover_z).max(self.gripper.tool.position.z);
+        let transit_z = (self.top_z() + below_m + CLEARANCE_M).max(hover_z).max(self.gripper.tool.position.z);
         Ok(Goal { target, transit_z, hover_z })
     }
 
@@ -122,6 +128,9 @@ impl Simulation {
 
     fn grip(&mut self) -> Result<(), Cause> {
         self.open()?;
+        if self.sees() {
+            return self.grip_what_is_seen();
+        }
         // From the palm: a body that was just released reaches above the gripper's reference point.
         let palm = self.gripper.tool.at_height(self.gripper.tool.position.z + PALM_M).position;
         let found = self.world.below(palm, None);
@@ -132,13 +141,18 @@ impl Simulation {
             self.close_on_air()?;
             return self.miss();
         };
-        let shape = self.scene.body(body).shape;
         let grasp = self.plan_grasp(body);
         self.follow(Tool { yaw_rad: grasp.yaw_rad, ..self.gripper.tool }, Air::Unknown)?;
         if !self.shift(grasp.position)? {
             return self.miss();
         }
         self.sink(grasp.position.z, 0.0)?;
+        self.take(body)
+    }
+
+    /// Closes on a body and holds it, if it is well between the fingers then.
+    pub(super) fn take(&mut self, body: BodyIndex) -> Result<(), Cause> {
+        let shape = self.scene.body(body).shape;
         if !self.close_on(body) || !grasp::is_between_fingers(&shape, &self.gripper.tool, &self.world.in_world(body)) {
             return self.miss();
         }
@@ -151,7 +165,7 @@ impl Simulation {
     /// never can.
     fn plan_grasp(&self, body: BodyIndex) -> Grasp {
         let tool = self.gripper.tool;
-        let plans = Grasp::plans(&self.scene.body(body).shape, &self.world.in_world(body), &tool);
+        let plans = Grasp::plans(&self.scene.body(body).shape, &self.world.in_world(body), &tool, self.gripper.jaw_m);
         let is_free = |grasp: &&Grasp| {
             let turned = Tool { yaw_rad: grasp.yaw_rad, ..tool };
             let down = Vector::new(0.0, 0.0, (grasp.position.z - tool.position.z).min(0.0));
@@ -161,22 +175,24 @@ impl Simulation {
         plans.iter().find(is_free).or(plans.first()).copied().unwrap_or(as_it_is)
     }
 
-    fn miss(&mut self) -> Result<(), Cause> {
+    pub(super) fn miss(&mut self) -> Result<(), Cause> {
         self.open()?;
         Err(Cause::MissedGrasp)
     }
 
     fn release(&mut self) -> Result<(), Cause> {
-        let gap_m = match drop_spot::container_below(&self.scene, &self.world, &self.gripper) {
-            None => SET_DOWN_M,
+        let below = drop_spot::container_below(&self.scene, |body| self.believed(body), &self.gripper);
+        let (z, gap_m) = match below {
+            None => (self.rest_z(), SET_DOWN_M),
             Some(container) => {
                 self.gripper.opens_to_m = drop_spot::opening_m(&self.scene, &self.gripper, container);
-                let spot = drop_spot::choose(&self.scene, &self.world, &self.gripper, container);
+                let spot = self.drop_spot(container);
                 self.shift(spot)?;
-                DROP_M
+                (f32::MIN, DROP_M)
             }
         };
-        self.sink(f32::MIN, gap_m)?;
+        self.sink(z, gap_m)?;
+        self.leave();
         self.lift_off_z = None;
         let Some(body) = self.gripper.let_go(&mut self.world) else {
             return Err(Cause::DroppedObject);
@@ -185,6 +201,16 @@ impl Simulation {
         self.follow(open, Air::Unknown)?;
         Gripper::part_from(&mut self.world, body);
         self.rest()
+    }
+
+    /// Where in a container to let go of what is held.
+    fn drop_spot(&self, container: BodyIndex) -> Vector {
+        let Self { scene, world, gripper, .. } = self;
+        let place = (container, self.believed(container));
+        if self.sees() {
+            return drop_spot::choose(scene, world, gripper, place, |spot| -self.support_z(spot));
+        }
+        drop_spot::choose(scene, world, gripper, place, |spot| drop_spot::fall_m(world, gripper, spot))
     }
 
     /// Steps until all is at rest.
@@ -199,12 +225,13 @@ impl Simulation {
     }
 
     fn open(&mut self) -> Result<(), Cause> {
-        self.gripper.opens_to_m = MAX_OPENING_M;
-        self.follow(Tool { opening_m: MAX_OPENING_M, ..self.gripper.tool }, Air::Unknown)
+        let opening_m = self.gripper.jaw_m;
+        self.gripper.opens_to_m = opening_m;
+        self.follow(Tool { opening_m, ..self.gripper.tool }, Air::Unknown)
     }
 
     /// Closes until the fingers meet each other or something that is not to be grasped.
-    fn close_on_air(&mut self) -> Result<(), Cause> {
+    pub(super) fn close_on_air(&mut self) -> Result<(), Cause> {
         let opening_m = self.gripper.tool.opening_m - 2.0 * self.gripper.free_closing_m(&self.world);
         self.follow(Tool { opening_m, ..self.gripper.tool }, Air::Unknown)
     }
@@ -232,6 +259,10 @@ impl Simulation {
     fn shift(&mut self, place: Vector) -> Result<bool, Cause> {
         let tool = self.gripper.tool;
         let over = Vector::new(place.x, place.y, tool.position.z);
+        if self.sees() {
+            self.follow(Tool { position: over, ..tool }, Air::Unknown)?;
+            return Ok(true);
+        }
         let way = over - tool.position;
         let is_free = self.gripper.free_way_m(&self.world, &tool, way, AtStart::MayLeave) >= way.length();
         if is_free {
@@ -263,13 +294,15 @@ impl Simulation {
         self.lift_off_z = None;
     }
 
-    /// Straight down to a height, or until the gripper or what it holds is `gap_m` above something.
-    fn sink(&mut self, z: f32, gap_m: f32) -> Result<(), Cause> {
+    /// Straight down to a height, or until the gripper or what it holds is `gap_m` above something; gives how far above
+    /// the height it ended.
+    pub(super) fn sink(&mut self, z: f32, gap_m: f32) -> Result<f32, Cause> {
         let tool = self.gripper.tool;
         let depth_m = (tool.position.z - z).min(2.0);
         let free_m = self.gripper.free_way_m(&self.world, &tool, Vector::new(0.0, 0.0, -depth_m), AtStart::Stops);
         let way_m = if free_m < depth_m { (free_m - gap_m).max(0.0) } else { depth_m };
-        self.follow(tool.at_height(tool.position.z - way_m), Air::Clear)
+        self.follow(tool.at_height(tool.position.z - way_m), Air::Clear)?;
+        Ok(depth_m - way_m)
     }
 
     /// A straight way from where the gripper is.
@@ -277,30 +310,23 @@ impl Simulation {
         self.mover.way(self.gripper.tool, to, || self.around(), &self.config)
     }
 
-    fn follow(&mut self, to: Tool, air: Air) -> Result<(), Cause> {
+    pub(super) fn follow(&mut self, to: Tool, air: Air) -> Result<(), Cause> {
         let way = self.way(to)?;
         self.go(&way, air);
         Ok(())
     }
 
+    /// Where one sees, the way is not known to be as free as it looks.
     fn go(&mut self, way: &Way, air: Air) {
+        let air = if self.sees() { Air::Unknown } else { air };
         (1..=way.n_steps()).for_each(|step| self.step_along(way, step, air));
     }
 
     /// What an arm must keep clear of now: everything that it does not hold.
     pub(super) fn around(&self) -> Around {
-        let solids = self
-            .world
-            .boxes(self.gripper.held_handle())
-            .map(|bounds| Solid { least: in_base(bounds.mins), most: in_base(bounds.maxs) });
+        let boxes = self.boxes().into_iter();
+        let solids = boxes.map(|bounds| Solid { least: in_base(bounds.mins), most: in_base(bounds.maxs) });
         let obstacles = Obstacles { solids: solids.collect(), ..Obstacles::table(in_base(Vector::ZERO).z, MARGIN_M) };
         Around { obstacles, load: self.gripper.load(&self.world) }
-    }
-
-    fn body_in_world(&self, body: BodyIndex) -> EnginePose {
-        match self.gripper.flown() {
-            Some((flown, in_world)) if flown == body => in_world,
-            _ => self.world.in_world(body),
-        }
     }
 }

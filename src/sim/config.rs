@@ -4,7 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::robot::RobotKind;
 use crate::sim::SimError;
+use crate::sim::gripper::MAX_OPENING_M;
 use crate::task::Layout;
+
+/// A gripper that opens less grips nothing.
+const LEAST_JAW_M: f32 = 0.01;
 
 /// Settings of a simulation. The defaults are what the published figures were measured with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -17,6 +21,9 @@ pub struct SimulationConfig {
     /// have its bench.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
+    /// How far the gripper opens at most, in metres, 0.01 to 0.07; 0.07 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jaw_m: Option<f32>,
     /// Physics steps per simulated second, 120 to 2000. Contacts are tuned for 240.
     pub step_hz: u32,
     /// Recorded frames per simulated second between boundaries, at most `step_hz`; 0 records boundaries alone.
@@ -34,6 +41,7 @@ impl Default for SimulationConfig {
         Self {
             robot: RobotKind::default(),
             layout: None,
+            jaw_m: None,
             step_hz: 240,
             frame_hz: 10,
             speed_m_per_s: 1.25,
@@ -50,12 +58,16 @@ impl SimulationConfig {
     ///
     /// [`SimError::Config`] for the first setting that is not allowed.
     pub fn check(&self) -> Result<(), SimError> {
-        let Self { robot, layout, step_hz, frame_hz, speed_m_per_s, acceleration_m_per_s2, settle_limit_secs } = self;
+        let Self { robot, layout, jaw_m, step_hz, frame_hz, speed_m_per_s, acceleration_m_per_s2, settle_limit_secs } =
+            self;
         let wrong =
             |key, found: String, allowed: &str| Err(SimError::Config { key, found, allowed: allowed.to_owned() });
         let positive = |value: f32, most: f32| value > 0.0 && value <= most;
         if *layout == Some(Layout::Table) && robot.layout() == Layout::Bench {
             return wrong("layout", "table".to_owned(), "bench, where the arm reaches everything");
+        }
+        if let Some(jaw_m) = jaw_m.filter(|jaw_m| !(LEAST_JAW_M..=MAX_OPENING_M).contains(jaw_m)) {
+            return wrong("jaw_m", jaw_m.to_string(), "0.01 to 0.07");
         }
         if !(120..=2000).contains(step_hz) {
             return wrong("step_hz", step_hz.to_string(), "120 to 2000");
@@ -78,6 +90,11 @@ impl SimulationConfig {
     /// How things are laid out.
     pub fn layout(&self) -> Layout {
         self.layout.unwrap_or_else(|| self.robot.layout())
+    }
+
+    /// How far the gripper opens at most, in metres.
+    pub fn jaw_m(&self) -> f32 {
+        self.jaw_m.unwrap_or(MAX_OPENING_M)
     }
 
     /// The longest wait for rest, in steps.

@@ -7,7 +7,7 @@ use rapier3d::geometry::SharedShape;
 
 use crate::geometry::Vec3;
 use crate::scene::{BodyIndex, Scene, Shape};
-use crate::sim::gripper::{Gripper, MAX_OPENING_M, reach_m};
+use crate::sim::gripper::{Gripper, reach_m};
 use crate::sim::motion::Tool;
 use crate::sim::sweep::AtStart;
 use crate::sim::world::World;
@@ -26,12 +26,16 @@ const SPOTS: [[f32; 2]; 9] =
 
 /// The open box or bowl that the gripper is over or in, of nested ones the uppermost; none for a bowl in the gripper,
 /// which is set down in the middle.
-pub(super) fn container_below(scene: &Scene, world: &World, gripper: &Gripper) -> Option<BodyIndex> {
+pub(super) fn container_below(
+    scene: &Scene,
+    in_world: impl Fn(BodyIndex) -> EnginePose,
+    gripper: &Gripper,
+) -> Option<BodyIndex> {
     if gripper.held.is_some_and(|held| scene.body(held.body).shape.rim_m().is_some()) {
         return None;
     }
     let is_over = |&body: &BodyIndex| {
-        let tool = world.in_world(body).inverse_transform_point(gripper.tool.position);
+        let tool = in_world(body).inverse_transform_point(gripper.tool.position);
         let is_between_walls = match scene.body(body).shape {
             Shape::OpenBox { inner_m: [x, y, _], .. } => tool.x.abs() <= x && tool.y.abs() <= y,
             Shape::Bowl(bowl) => Vector::new(tool.x, tool.y, 0.0).length() <= bowl.rim_radius_m,
@@ -39,25 +43,31 @@ pub(super) fn container_below(scene: &Scene, world: &World, gripper: &Gripper) -
         };
         is_between_walls && tool.z > 0.0
     };
-    let floor_z = |body: BodyIndex| world.in_world(body).translation.z;
+    let floor_z = |body: BodyIndex| in_world(body).translation.z;
     scene.body_indices().filter(is_over).max_by(|&a, &b| floor_z(a).total_cmp(&floor_z(b)))
 }
 
 /// How far to open the fingers there: in a bowl they have little room.
 pub(super) fn opening_m(scene: &Scene, gripper: &Gripper, container: BodyIndex) -> f32 {
     match scene.body(container).shape {
-        Shape::Bowl(_) => (gripper.tool.opening_m + BOWL_OPENING_M).min(MAX_OPENING_M),
-        _ => MAX_OPENING_M,
+        Shape::Bowl(_) => (gripper.tool.opening_m + BOWL_OPENING_M).min(gripper.jaw_m),
+        _ => gripper.jaw_m,
     }
 }
 
-/// Where to hold the gripper, at its present height, before it goes down into the container.
-pub(super) fn choose(scene: &Scene, world: &World, gripper: &Gripper, container: BodyIndex) -> Vector {
+/// Where to hold the gripper, at its present height, before it goes down into a container that stands somewhere;
+/// `fall_m` tells how far what is held goes down from a spot.
+pub(super) fn choose(
+    scene: &Scene,
+    world: &World,
+    gripper: &Gripper,
+    (container, in_world): (BodyIndex, EnginePose),
+    fall_m: impl Fn(Vector) -> f32,
+) -> Vector {
     let tool = gripper.tool;
     let (Some(held), Some(rim_m)) = (gripper.held, scene.body(container).shape.rim_m()) else {
         return tool.position;
     };
-    let in_world = world.in_world(container);
     if in_world.inverse_transform_point(tool.position).z < rim_m {
         return tool.position;
     }
@@ -73,9 +83,9 @@ pub(super) fn choose(scene: &Scene, world: &World, gripper: &Gripper, container:
             .collect(),
         _ => return tool.position,
     };
-    let mut best = (spots[0], fall_m(world, gripper, spots[0]));
+    let mut best = (spots[0], fall_m(spots[0]));
     for spot in &spots[1..] {
-        let fall = fall_m(world, gripper, *spot);
+        let fall = fall_m(*spot);
         if fall > best.1 + LOWER_M {
             best = (*spot, fall);
         }
@@ -108,7 +118,7 @@ fn free_half_widths_m([x, y]: [f32; 2], [hand_x, hand_y]: [f32; 2], load: &Vec3)
 }
 
 /// How far what is held can go down from a spot.
-fn fall_m(world: &World, gripper: &Gripper, spot: Vector) -> f32 {
+pub(super) fn fall_m(world: &World, gripper: &Gripper, spot: Vector) -> f32 {
     let down = Vector::new(0.0, 0.0, -1.0);
     let parts = gripper.carried(world, &Tool { position: spot, ..gripper.tool });
     let fall_m = |(shape, in_world): &(SharedShape, EnginePose)| {

@@ -26,4 +26,13 @@ pub enum SimError {
     HeldAtStart { name: String },
     #[error("the gripper starts {found_m} m open; allowed: 0 to {allowed_m}")]
     Opening { found_m: f32, allowed_m: f32 },
+    #[error("perception.{0}")]
+    Perception(#[from] crate::perception::PerceptionError),
+}
+
+impl SimError {
+    /// Whether it is of a setting of the simulation.
+    pub fn is_of(&self, setting: &str) -> bool {
+        matches!(self, Self::Config { key, .. } if *key == setting)
+    }
 }

@@ -6,7 +6,7 @@ use rapier3d::math::{Pose as EnginePose, Rotation, Vector};
 
 use crate::robot::GRASP_M;
 use crate::scene::{Bowl, Shape};
-use crate::sim::gripper::{MAX_OPENING_M, TIP_M};
+use crate::sim::gripper::TIP_M;
 use crate::sim::motion::{Tool, turn_rad};
 
 /// Fingers must be this much wider open than the body, in metres.
@@ -31,14 +31,14 @@ pub(super) struct Grasp {
 }
 
 impl Grasp {
-    /// Ways to close on a body, at least one, the one with the least turn first: at its middle, with the yaws of
-    /// [`yaws_rad`]; at the wall of a bowl.
-    pub(super) fn plans(shape: &Shape, in_world: &EnginePose, tool: &Tool) -> Vec<Self> {
+    /// Ways to close on a body with fingers that open so far, at least one, the one with the least turn first: at its
+    /// middle, with the yaws of [`yaws_rad`]; at the wall of a bowl.
+    pub(super) fn plans(shape: &Shape, in_world: &EnginePose, tool: &Tool, jaw_m: f32) -> Vec<Self> {
         if let Shape::Bowl(bowl) = shape {
             return vec![Self::rim(bowl, in_world, tool.yaw_rad)];
         }
         let position = Vector::new(tool.position.x, tool.position.y, in_world.translation.z + GRASP_M);
-        let yaws = yaws_rad(shape, in_world, tool.yaw_rad);
+        let yaws = yaws_rad(shape, in_world, tool.yaw_rad, jaw_m);
         yaws.into_iter().map(|yaw_rad| Self { position, yaw_rad }).collect()
     }
 
@@ -60,9 +60,9 @@ impl Grasp {
 /// The yaws with which the fingers, which close along the gripper's y, meet a body's nearest parallel sides: across its
 /// shorter side, and of equal sides the one that is nearest to the present yaw first. The present one alone where no
 /// turn is needed or helps.
-fn yaws_rad(shape: &Shape, in_world: &EnginePose, now_rad: f32) -> Vec<f32> {
+fn yaws_rad(shape: &Shape, in_world: &EnginePose, now_rad: f32, jaw_m: f32) -> Vec<f32> {
     let sides = sides(shape, in_world);
-    let fits = sides.iter().filter(|side| 2.0 * side.half_m + FINGER_ROOM_M <= MAX_OPENING_M);
+    let fits = sides.iter().filter(|side| 2.0 * side.half_m + FINGER_ROOM_M <= jaw_m);
     let shortest_m = fits.clone().map(|side| side.half_m).fold(f32::MAX, f32::min);
     let mut turns: Vec<f32> = fits
         .filter(|side| side.half_m <= shortest_m + EQUAL_M)
@@ -135,7 +135,7 @@ mod tests {
 
     #[track_caller]
     fn check(half_extents_m: [f32; 3], body_yaw_rad: f32, expected_rad: f32) {
-        let found = yaws_rad(&Shape::Cuboid { half_extents_m }, &turned(body_yaw_rad), 0.0)[0];
+        let found = yaws_rad(&Shape::Cuboid { half_extents_m }, &turned(body_yaw_rad), 0.0, 0.07)[0];
         // The two fingers are alike: half a turn is no difference.
         let difference = (found - expected_rad).rem_euclid(PI);
         assert!(difference.min(PI - difference) < 1e-3, "{found} instead of {expected_rad}");

@@ -16,7 +16,7 @@ use rapier3d::parry::query::distance;
 use rapier3d::parry::shape::Cuboid;
 
 use crate::arm::Load;
-use crate::scene::{BodyIndex, Scene};
+use crate::scene::{BodyIndex, Mobility, Scene};
 use crate::sim::motion::Tool;
 use crate::sim::sweep::AtStart;
 use crate::sim::world::{GRIPPER_GROUP, SCENE_GROUP, World, groups};
@@ -64,6 +64,8 @@ enum Engine {
 pub(super) struct Gripper {
     pub(super) tool: Tool,
     pub(super) held: Option<Held>,
+    /// How far the fingers open at most.
+    pub(super) jaw_m: f32,
     /// How far the fingers will open next: their way is kept clear so far.
     pub(super) opens_to_m: f32,
     palm: RigidBodyHandle,
@@ -89,7 +91,7 @@ pub(super) const fn reach_m(opening_m: f32) -> f32 {
 const SIDES: [f32; 2] = [1.0, -1.0];
 
 impl Gripper {
-    pub(super) fn new(world: &mut World, tool: Tool) -> Self {
+    pub(super) fn new(world: &mut World, tool: Tool, jaw_m: f32) -> Self {
         let mut insert = |half: [f32; 3], in_world: EnginePose| {
             let collider = ColliderBuilder::cuboid(half[0], half[1], half[2])
                 .friction(FINGER_FRICTION)
@@ -98,7 +100,7 @@ impl Gripper {
         };
         let palm = insert(PALM_HALF_M, palm_in_world(&tool));
         let fingers = SIDES.map(|side| insert(FINGER_HALF_M, finger_in_world(&tool, side)));
-        Self { tool, held: None, opens_to_m: MAX_OPENING_M, palm, fingers, engine: Engine::Current, above: Vec::new() }
+        Self { tool, held: None, jaw_m, opens_to_m: jaw_m, palm, fingers, engine: Engine::Current, above: Vec::new() }
     }
 
     /// The same below an arm: its body and the arm's wrist must pass too.
@@ -190,6 +192,22 @@ impl Gripper {
             (collider.shared_shape().clone(), tool.in_world() * held.in_gripper * in_body)
         };
         world.colliders(held.body).map(part).collect()
+    }
+
+    /// Whether the palm touches something that moves.
+    pub(super) fn is_palm_touching(&self, world: &World) -> bool {
+        world.is_touching(self.palm)
+    }
+
+    /// The body that is best between the fingers, if both are nearer to it than they are open.
+    pub(super) fn between_fingers(&self, scene: &Scene, world: &World) -> Option<BodyIndex> {
+        let movable = scene.body_indices().filter(|&body| scene.body(body).mobility == Mobility::Movable);
+        let farther_m = |body: BodyIndex| {
+            let [left_m, right_m] = self.finger_gaps_m(world, body);
+            left_m.max(right_m)
+        };
+        let gaps = movable.map(|body| (body, farther_m(body))).filter(|(_, gap_m)| *gap_m < self.tool.opening_m);
+        gaps.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(body, _)| body)
     }
 
     pub(super) fn held_handle(&self) -> Option<RigidBodyHandle> {

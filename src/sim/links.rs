@@ -48,6 +48,11 @@ impl Links {
         }
         self.posture = posture;
     }
+
+    /// Whether one of them touches something that moves.
+    pub(super) fn are_touching(&self, world: &World) -> bool {
+        self.bodies.iter().any(|&link| world.is_touching(link))
+    }
 }
 
 fn places(posture: &Posture) -> [EnginePose; N_JOINTS] {

@@ -34,6 +34,11 @@ impl Tool {
         EnginePose::from_parts(self.position, Rotation::from_rotation_z(self.yaw_rad))
     }
 
+    /// The same at its own height over a place.
+    pub(super) fn over(self, place: Vector) -> Self {
+        Self { position: Vector::new(place.x, place.y, self.position.z), ..self }
+    }
+
     /// The same at another height.
     pub(super) fn at_height(self, z: f32) -> Self {
         Self { position: Vector::new(self.position.x, self.position.y, z), ..self }

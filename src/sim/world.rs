@@ -193,6 +193,26 @@ impl World {
         })
     }
 
+    /// Boxes around a body if it were somewhere: one, of a box without lid one a wall.
+    pub(super) fn boxes_at(&self, index: BodyIndex, in_world: &EnginePose) -> Vec<Aabb> {
+        let bounds = |collider: &Collider| {
+            let in_body = collider.position_wrt_parent().copied().unwrap_or(EnginePose::IDENTITY);
+            collider.shape().compute_aabb(&(*in_world * in_body))
+        };
+        let boxes: Vec<Aabb> = self.colliders(index).map(bounds).collect();
+        match boxes.len() {
+            0..=N_OPEN_BOX_PARTS => boxes,
+            _ => boxes.into_iter().reduce(|a, b| a.merged(&b)).into_iter().collect(),
+        }
+    }
+
+    /// Whether a part of the robot touches something that moves.
+    pub(super) fn is_touching(&self, part: RigidBodyHandle) -> bool {
+        let colliders = self.engine.bodies[part].colliders().iter();
+        let mut pairs = colliders.flat_map(|&collider| self.engine.narrow_phase.contact_pairs_with(collider));
+        pairs.any(|pair| pair.find_deepest_contact().is_some_and(|(_, contact)| contact.dist < 0.0))
+    }
+
     /// The first thing straight below a point.
     pub(super) fn below(&self, point: Vector, except: Option<RigidBodyHandle>) -> Option<Hit> {
         let ray = Ray::new(point, Vector::new(0.0, 0.0, -1.0));

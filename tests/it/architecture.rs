@@ -21,6 +21,7 @@ const ORDER: &[&str] = &[
     "trace",
     "render",
     "video",
+    "perception",
     "robot",
     "sim",
     "remote",

@@ -1,4 +1,4 @@
-//! The arm through every stage: a pipeline whose robot is Sawyer, and suites whose robots differ.
+//! The arm through every stage: a pipeline whose robot is Sawyer, suites whose robots differ, and robots that see.
 
 use std::path::Path;
 
@@ -133,4 +133,92 @@ fn an_unknown_robot_is_refused_by_name() {
     let (code, _, stderr) = run(&["run", &path, "--out", &text(&folder.path().join("run"))]);
     assert_eq!(code, 2, "{stderr}");
     assert!(stderr.contains("bench, where the arm reaches everything"), "{stderr}");
+}
+
+const ROBOT_TABLE: &str = r#"
+name = "robot_table"
+seed = 5
+[tasks]
+family = "block_stacking"
+train = 2
+unseen = 4
+[generate]
+trials_per_task = 1
+frames = "boundaries"
+[rollout]
+record = 3
+oracle = true
+[[rollout.suites]]
+name = "seen_well"
+split = "unseen"
+episodes = 3
+robot = "sawyer"
+perception = {}
+[[rollout.suites]]
+name = "seen_badly"
+split = "unseen"
+episodes = 3
+robot = "sawyer"
+jaw_m = 0.057
+perception = { camera = "right", sensor = "exact", calibration_deg = 0.0, calibration_mm = 60.0, depth_mm = 0.0 }
+[[rollout.suites]]
+name = "known"
+split = "unseen"
+episodes = 2
+"#;
+
+#[test]
+fn a_robot_that_sees_acts_the_same_any_number_of_jobs_and_its_rows_tell_with_what_it_saw() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), ROBOT_TABLE);
+    let out = folder.path().join("run");
+    let (code, _, stderr) = run(&["run", &path, "--out", &text(&out), "--jobs", "2"]);
+    assert_eq!(code, 0, "{stderr}");
+    let (code, stdout, stderr) = run(&[
+        "query",
+        &text(&out),
+        "SELECT suite, jaw_m, camera, sensor, calibration_deg, calibration_mm, depth_mm, COUNT(localisation_mm) AS n FROM \
+         rollouts GROUP BY suite, jaw_m, camera, sensor, calibration_deg, calibration_mm, depth_mm ORDER BY suite",
+        "--csv",
+    ]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(
+        stdout.lines().skip(1).collect::<Vec<_>>(),
+        [
+            "known,0.07,,,,,,0",
+            "seen_badly,0.057,right,exact,0.0,60.0,0.0,3",
+            "seen_well,0.07,front,kinect,0.1,1.5,2.0,3"
+        ]
+    );
+    let (_, stdout, _) =
+        run(&["query", &text(&out), "SELECT suite, failure, localisation_mm FROM rollouts WHERE NOT success", "--csv"]);
+    let badly: Vec<&str> = stdout.lines().filter(|line| line.starts_with("seen_badly")).collect();
+    assert!(!badly.is_empty(), "blocks are gripped 6 cm beside where they stand");
+    assert!(badly.iter().all(|line| line.split(',').nth(1).is_some_and(|failure| !failure.is_empty())), "{badly:?}");
+    let recording = out.join("rollouts/oracle/seen_badly/recordings/shard-00000-of-00001.mcap");
+    for episode in ["0", "1", "2"] {
+        let (code, stdout, stderr) = run(&["replay", &text(&recording), "--episode", episode, "--verify"]);
+        assert_eq!(code, 0, "{stdout} {stderr}");
+    }
+    let page = std::fs::read_to_string(out.join("report/index.html")).unwrap();
+    assert!(page.contains("Robot table") && page.contains("Block Stacking, real robot"));
+    let again = folder.path().join("again");
+    let (code, _, stderr) = run(&["run", &path, "--out", &text(&again), "--jobs", "1", "--to", "rollout"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(hashes(&out, &["rollouts"]), hashes(&again, &["rollouts"]));
+}
+
+#[test]
+fn a_camera_or_a_gripper_that_cannot_be_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for (from, to, said) in [
+        ("perception = {}", "perception = { depth_mm = -1.0 }", "depth_mm is -1; allowed: from 0 to 100"),
+        ("perception = {}", "perception = { camera = \"below\" }", "below"),
+        ("jaw_m = 0.057", "jaw_m = 0.2", "jaw_m is 0.2; allowed: 0.01 to 0.07"),
+    ] {
+        let path = write(folder.path(), &ROBOT_TABLE.replace(from, to));
+        let (code, _, stderr) = run(&["run", &path, "--out", &text(&folder.path().join("run"))]);
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains(said), "{stderr}");
+    }
 }

@@ -63,6 +63,8 @@ mod model;
 #[cfg(test)]
 mod painter;
 #[cfg(test)]
+mod perception;
+#[cfg(test)]
 mod pipeline;
 #[cfg(test)]
 mod pipeline_pictures;

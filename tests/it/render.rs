@@ -70,6 +70,21 @@ fn depth_is_true_to_a_slanted_face_everywhere() {
 }
 
 #[test]
+fn depths_alone_are_those_of_the_picture() {
+    for family in Family::ALL {
+        let scene = scene(family, &[]);
+        let state = initial_state(family, &scene, Seed(3));
+        let camera = Camera::front(family, [128, 96]);
+        let mut renderer = Renderer::new(Look { shadows: Shadows::None, ..Look::plain() });
+        let whole = renderer.draw(&scene, &state, &camera).clone();
+        let depths = renderer.draw_depths(&scene, &state, &camera).clone();
+        assert_eq!((&depths.depth_m, &depths.segments), (&whole.depth_m, &whole.segments), "{}", family.name());
+        assert!(depths.rgb.is_empty());
+        assert_eq!(*renderer.draw(&scene, &state, &camera), whole, "what was drawn before does not show");
+    }
+}
+
+#[test]
 fn a_point_falls_where_the_calibration_says() {
     let (_, state) = cube_scene();
     let camera = Camera::front(Family::BlockStacking, [640, 480]);

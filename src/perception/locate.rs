@@ -1,0 +1,259 @@
+//! Where a body of known form stands, from points of its surface.
+//!
+//! The sum of squared distances of the points from the surface is made small over position and turn about the vertical
+//! (Gauss and Newton, damped; Tukey's weights, so that points of other surfaces count for nothing), from where the body
+//! was seen last, and where that does not do from several turns and with each of its sides up.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use crate::geometry::{Pose, Rotation, Vec3};
+use crate::perception::surface;
+use crate::scene::Shape;
+
+/// Fewer points tell nothing.
+const LEAST_POINTS: usize = 20;
+/// Points farther from the surface than this count for nothing, in metres: at first, and in the end.
+const WIDE_M: f32 = 0.03;
+const NEAR_M: f32 = 0.008;
+const N_STEPS: usize = 12;
+/// How many of them are wide.
+const N_WIDE: usize = 6;
+/// Part of the points' number that damps a step: what the points do not tell stays as it was.
+const DAMPING: f32 = 0.01;
+/// Turns are damped as if points were so far from the axis, in metres.
+const ARM_M: f32 = 0.03;
+/// A fit is believed with so many of its points near, and those so near on average, in metres.
+const LEAST_INLIERS: f32 = 0.6;
+const MOST_MISFIT_M: f32 = 0.004;
+/// With so good a fit where the body was seen last nothing else is looked for.
+const SAME_INLIERS: f32 = 0.75;
+const SAME_MISFIT_M: f32 = 0.0028;
+/// How far a body may have gone to be looked for from where it was, in metres.
+const SAME_PLACE_M: f32 = 0.03;
+
+/// A body as it was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fit {
+    pub(super) in_world: Pose,
+    /// Share of the points that are near its surface.
+    inliers: f32,
+    /// Root of their mean squared distance.
+    misfit_m: f32,
+    /// Sum of squared distances of all points, each at most [`NEAR_M`] squared.
+    cost: f32,
+}
+
+impl Fit {
+    fn is_believed(&self) -> bool {
+        self.inliers >= LEAST_INLIERS && self.misfit_m <= MOST_MISFIT_M
+    }
+
+    fn is_the_same(&self) -> bool {
+        self.inliers >= SAME_INLIERS && self.misfit_m <= SAME_MISFIT_M
+    }
+}
+
+/// Finds a body from points in the world that a camera at `eye` sees of it; `None` where they do not show it.
+pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&Pose>) -> Option<Fit> {
+    if points.len() < LEAST_POINTS {
+        return None;
+    }
+    let start = start(shape, points, eye);
+    let is_near = |last: &&Pose| (last.translation.vector - start).norm() <= SAME_PLACE_M;
+    if let Some(last) = last.filter(is_near) {
+        let found = fit(shape, points, last);
+        if found.is_the_same() {
+            return Some(alike(shape, found, last));
+        }
+    }
+    let stances = stances(shape);
+    let starts = stances.iter().flat_map(|&(stance, half_height_m)| {
+        let position = Vec3::new(start.x, start.y, top_z(points) - half_height_m);
+        turns_rad(shape, &stance).map(move |turn_rad| Pose::from_parts(position.into(), yaw(turn_rad) * stance))
+    });
+    let best = starts.map(|start| fit(shape, points, &start)).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let best = last.map_or(best, |last| alike(shape, best, last));
+    best.is_believed().then_some(best)
+}
+
+fn yaw(turn_rad: f32) -> Rotation {
+    Rotation::from_axis_angle(&Vec3::z_axis(), turn_rad)
+}
+
+/// The turns that points are fitted from, over the period of a form.
+fn turns_rad(shape: &Shape, stance: &Rotation) -> impl Iterator<Item = f32> + use<> {
+    let n_starts: usize = match shape {
+        Shape::Ball { .. } => 1,
+        Shape::Cylinder { .. } if *stance == Rotation::identity() => 1,
+        Shape::Bowl(_) => 2,
+        Shape::Cylinder { .. } | Shape::Cuboid { .. } | Shape::OpenBox { .. } => 4,
+    };
+    let period_rad = period_rad(shape);
+    (0..n_starts).map(move |start| period_rad * start as f32 / n_starts as f32)
+}
+
+/// The least turn about the vertical after which a form is the same.
+fn period_rad(shape: &Shape) -> f32 {
+    match *shape {
+        Shape::Cuboid { half_extents_m: [x, y, z] } if x == y && y == z => FRAC_PI_2,
+        Shape::OpenBox { inner_m: [x, y, _], .. } if x == y => FRAC_PI_2,
+        Shape::Bowl(_) => FRAC_PI_4,
+        Shape::Cuboid { .. } | Shape::OpenBox { .. } | Shape::Cylinder { .. } | Shape::Ball { .. } => PI,
+    }
+}
+
+/// The ways to stand or lie that look different, each with the height of the centre's upper end above it.
+fn stances(shape: &Shape) -> Vec<(Rotation, f32)> {
+    let upright = Rotation::identity();
+    let x_up = Rotation::from_axis_angle(&Vec3::y_axis(), -FRAC_PI_2);
+    let y_up = Rotation::from_axis_angle(&Vec3::x_axis(), FRAC_PI_2);
+    match *shape {
+        Shape::Cuboid { half_extents_m: [x, y, z] } if x == y && y == z => vec![(upright, z)],
+        Shape::Cuboid { half_extents_m: [x, y, z] } if y == z => vec![(upright, z), (x_up, x)],
+        Shape::Cuboid { half_extents_m: [x, y, z] } => vec![(upright, z), (x_up, x), (y_up, y)],
+        Shape::Cylinder { radius_m, half_height_m } => vec![(upright, half_height_m), (x_up, radius_m)],
+        Shape::Ball { radius_m } => vec![(upright, radius_m)],
+        Shape::OpenBox { .. } | Shape::Bowl(_) => vec![(upright, shape.rim_m().unwrap_or(0.0))],
+    }
+}
+
+/// About where the body's middle is: behind the middle of its points, as the camera sees them.
+fn start(shape: &Shape, points: &[Vec3], eye: &Vec3) -> Vec3 {
+    let middle = points.iter().sum::<Vec3>() / points.len() as f32;
+    let away = Vec3::new(middle.x - eye.x, middle.y - eye.y, 0.0).try_normalize(1e-6).unwrap_or_default();
+    let behind_m = if shape.rim_m().is_some() { 0.0 } else { 0.4 * shape.half_extents_m().min() };
+    let center = middle + away * behind_m;
+    Vec3::new(center.x, center.y, top_z(points) - shape.half_extents_m().z)
+}
+
+/// The height that nine points of ten are below.
+fn top_z(points: &[Vec3]) -> f32 {
+    let mut heights: Vec<f32> = points.iter().map(|point| point.z).collect();
+    let at = heights.len() * 9 / 10;
+    *heights.select_nth_unstable_by(at, f32::total_cmp).1
+}
+
+fn fit(shape: &Shape, points: &[Vec3], start: &Pose) -> Fit {
+    let mut pose = *start;
+    for step in 0..N_STEPS {
+        let width_m = if step < N_WIDE { WIDE_M } else { NEAR_M };
+        let Some(by) = improvement(shape, points, &pose, width_m) else { break };
+        pose.translation.vector += by.xyz();
+        pose.rotation = yaw(by.w.clamp(-0.5, 0.5)) * pose.rotation;
+        if by.xyz().norm() < 1e-5 && by.w.abs() < 1e-4 && step >= N_WIDE {
+            break;
+        }
+    }
+    judged(shape, points, pose)
+}
+
+/// A step of Gauss and Newton: a displacement and a turn.
+fn improvement(shape: &Shape, points: &[Vec3], pose: &Pose, width_m: f32) -> Option<nalgebra::Vector4<f32>> {
+    let mut normal = nalgebra::Matrix4::<f32>::zeros();
+    let mut right = nalgebra::Vector4::<f32>::zeros();
+    for point in points {
+        let about = point - pose.translation.vector;
+        let (distance_m, direction) = surface::distance(shape, &pose.rotation.inverse_transform_vector(&about));
+        let share = distance_m / width_m;
+        if share.abs() >= 1.0 {
+            continue;
+        }
+        let weight = (1.0 - share * share) * (1.0 - share * share);
+        let out = pose.rotation * direction;
+        // Moving the body along `out` brings its surface nearer; so does turning it under the point.
+        let row = nalgebra::Vector4::new(out.x, out.y, out.z, out.y * about.x - out.x * about.y);
+        normal += row * row.transpose() * weight;
+        right += row * (weight * distance_m);
+    }
+    let damping = DAMPING * points.len() as f32;
+    normal += nalgebra::Matrix4::from_diagonal(&nalgebra::Vector4::new(1.0, 1.0, 1.0, ARM_M * ARM_M)) * damping;
+    Some(normal.cholesky()?.solve(&right))
+}
+
+fn judged(shape: &Shape, points: &[Vec3], in_world: Pose) -> Fit {
+    let (mut n_near, mut squares, mut cost) = (0, 0.0, 0.0);
+    for point in points {
+        let (distance_m, _) = surface::distance(shape, &in_world.inverse_transform_point(&(*point).into()).coords);
+        let square = distance_m * distance_m;
+        cost += square.min(NEAR_M * NEAR_M);
+        if distance_m.abs() < NEAR_M {
+            (n_near, squares) = (n_near + 1, squares + square);
+        }
+    }
+    let inliers = n_near as f32 / points.len() as f32;
+    Fit { in_world, inliers, misfit_m: (squares / (n_near as f32).max(1.0)).sqrt(), cost }
+}
+
+/// The same as it was seen before: of the turns that look alike the nearest.
+fn alike(shape: &Shape, found: Fit, last: &Pose) -> Fit {
+    let period_rad = period_rad(shape);
+    let n_turns = (2.0 * PI / period_rad).round() as u32;
+    let turned = |turn: u32| yaw(period_rad * turn as f32) * found.in_world.rotation;
+    let nearest =
+        (0..n_turns).map(turned).min_by(|a, b| a.angle_to(&last.rotation).total_cmp(&b.angle_to(&last.rotation)));
+    let rotation = nearest.unwrap_or(found.in_world.rotation);
+    Fit { in_world: Pose::from_parts(found.in_world.translation, rotation), ..found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on the upper side and on two sides of a cube, as a camera before and above it sees them.
+    fn seen_of_cube(half_m: f32, in_world: &Pose) -> Vec<Vec3> {
+        let grid = || {
+            (0..10).flat_map(|row| (0..10).map(move |column| [row, column].map(|at| half_m * (at as f32 / 4.5 - 1.0))))
+        };
+        let faces = grid().flat_map(|[a, b]| [[a, b, half_m], [a, -half_m, b], [half_m, a, b]]);
+        faces.map(|point| in_world.transform_point(&point.into()).coords).collect()
+    }
+
+    #[test]
+    fn a_cube_is_found_where_it_stands_turned_as_it_is() {
+        let shape = Shape::Cuboid { half_extents_m: [0.025; 3] };
+        for turn_rad in [0.0, 0.3, 0.7, 1.2] {
+            let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.075), turn_rad);
+            let found = locate(&shape, &seen_of_cube(0.025, &in_world), &Vec3::new(0.3, -1.0, 1.0), None).unwrap();
+            let off_m = (found.in_world.translation.vector - in_world.translation.vector).norm();
+            let turn = (crate::geometry::yaw_rad(&found.in_world) - turn_rad).rem_euclid(FRAC_PI_2);
+            assert!(off_m < 1e-4, "{turn_rad}: {off_m}");
+            assert!(turn.min(FRAC_PI_2 - turn) < 1e-3, "{turn_rad}: {turn}");
+        }
+    }
+
+    #[test]
+    fn a_cube_keeps_the_turn_that_it_was_seen_with() {
+        let shape = Shape::Cuboid { half_extents_m: [0.025; 3] };
+        let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.025), 0.3 + FRAC_PI_2);
+        let last = crate::geometry::upright(Vec3::new(0.11, -0.05, 0.025), 0.25 + PI);
+        let found = locate(&shape, &seen_of_cube(0.025, &in_world), &Vec3::new(0.3, -1.0, 1.0), Some(&last)).unwrap();
+        assert!((crate::geometry::yaw_rad(&found.in_world) - (0.3 - PI)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn few_points_and_points_of_something_else_show_nothing() {
+        let shape = Shape::Cuboid { half_extents_m: [0.025; 3] };
+        let eye = Vec3::new(0.3, -1.0, 1.0);
+        let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.025), 0.3);
+        assert_eq!(locate(&shape, &seen_of_cube(0.025, &in_world)[..19], &eye, None), None);
+        assert_eq!(locate(&shape, &seen_of_cube(0.1, &in_world), &eye, None), None);
+    }
+
+    #[test]
+    fn a_can_that_lies_is_told_from_one_that_stands() {
+        let shape = Shape::Cylinder { radius_m: 0.0175, half_height_m: 0.03 };
+        let lying = Pose::from_parts(
+            Vec3::new(0.0, 0.1, 0.0175).into(),
+            yaw(0.4) * Rotation::from_axis_angle(&Vec3::y_axis(), -FRAC_PI_2),
+        );
+        let points = (0..20).flat_map(|turn| {
+            let angle = 0.15 * turn as f32 - 0.5;
+            (0..8).map(move |at| Vec3::new(0.0175 * angle.cos(), 0.0175 * angle.sin(), 0.03 * (at as f32 / 3.5 - 1.0)))
+        });
+        let points: Vec<Vec3> = points.map(|point| lying.transform_point(&point.into()).coords).collect();
+        let found = locate(&shape, &points, &Vec3::new(0.0, -0.95, 0.95), None).unwrap();
+        let axis = found.in_world.rotation * Vec3::z();
+        assert!(axis.z.abs() < 1e-3, "it stands: {axis:?}");
+        assert!((found.in_world.translation.vector - lying.translation.vector).norm() < 2e-3);
+    }
+}
