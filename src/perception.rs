@@ -35,8 +35,7 @@ use crate::scene::{BodyIndex, Scene, SceneState};
 use crate::seed::Seed;
 use crate::task::Family;
 
-use locate::Fit;
-use sensor::normals;
+use sensor::{Shown, normals};
 
 /// Pixels of a picture.
 const SIZE_PX: [u32; 2] = [512, 424];
@@ -44,6 +43,8 @@ const SIZE_PX: [u32; 2] = [512, 424];
 const FOCAL_PX: f32 = 365.46;
 /// Where robot and gripper are put to draw the table without them, in metres.
 const AWAY_M: f32 = 1000.0;
+/// What is hidden but for less than this part keeps its last place: the rest would be guessed.
+const LEAST_SHARE: f32 = 0.4;
 /// A look that shows less of the table's plane does not level the camera.
 const LEAST_TABLE_POINTS: usize = 50;
 
@@ -65,7 +66,7 @@ pub struct Perception {
 /// What is remembered of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory {
-    /// Where it was seen last; in the middle of the table before it was ever seen.
+    /// Where it was seen last; at the table's edge, out of sight, before it was ever seen.
     pub in_world: Pose,
     /// Whether it was ever seen.
     pub is_known: bool,
@@ -88,7 +89,8 @@ impl Perception {
         let error = Pose::from_parts(shift.into(), Rotation::from_scaled_axis(turn));
         let [width, height] = SIZE_PX;
         let mount = Mount::World(believed_in_world * error);
-        let unseen = Memory { in_world: Pose::identity(), is_known: false };
+        let edge = Pose::translation(scene.table_half_m[0], 0.0, 0.0);
+        let unseen = Memory { in_world: edge, is_known: false };
         let look = Look { shadows: Shadows::None, letters: Letters::None, ..Look::plain() };
         Ok(Self {
             config: config.clone(),
@@ -128,18 +130,21 @@ impl Perception {
         let cloud = sensor::measure(picture, &self.camera, self.config.sensor, scene.bodies.len(), &mut rng);
         let cloud = cloud.farther_by(self.depth_offset_m);
         let camera_in_world = self.leveled(&cloud.table);
-        for (index, points) in cloud.bodies.iter().enumerate() {
+        let eye = camera_in_world.translation.vector;
+        for (index, Shown { n_pixels, points }) in cloud.bodies.iter().enumerate() {
             let body = BodyIndex(index as u16);
             if state.held == Some(body) {
                 continue;
             }
-            let points: Vec<Vec3> =
-                points.iter().map(|point| camera_in_world.transform_point(&(*point).into()).coords).collect();
+            let in_world = |point: &Vec3| camera_in_world.transform_point(&(*point).into()).coords;
+            let points: Vec<Vec3> = points.iter().map(in_world).collect();
+            let shape = &scene.body(body).shape;
             let memory = &mut self.memory[index];
             let last = memory.is_known.then_some(memory.in_world);
-            let eye = camera_in_world.translation.vector;
-            if let Some(Fit { in_world, .. }) = locate::locate(&scene.body(body).shape, &points, &eye, last.as_ref()) {
-                *memory = Memory { in_world, is_known: true };
+            let Some(found) = locate::locate(shape, &points, &eye, last.as_ref()) else { continue };
+            let whole = FOCAL_PX * FOCAL_PX * locate::outline(shape, &found, &eye);
+            if *n_pixels as f32 >= LEAST_SHARE * whole {
+                *memory = Memory { in_world: found, is_known: true };
             }
         }
     }

@@ -54,7 +54,7 @@ impl Fit {
 }
 
 /// Finds a body from points in the world that a camera at `eye` sees of it; `None` where they do not show it.
-pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&Pose>) -> Option<Fit> {
+pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&Pose>) -> Option<Pose> {
     if points.len() < LEAST_POINTS {
         return None;
     }
@@ -63,7 +63,7 @@ pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&P
     if let Some(last) = last.filter(is_near) {
         let found = fit(shape, points, last);
         if found.is_the_same() {
-            return Some(alike(shape, found, last));
+            return Some(alike(shape, found.in_world, last));
         }
     }
     let stances = stances(shape);
@@ -72,8 +72,7 @@ pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&P
         turns_rad(shape, &stance).map(move |turn_rad| Pose::from_parts(position.into(), yaw(turn_rad) * stance))
     });
     let best = starts.map(|start| fit(shape, points, &start)).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    let best = last.map_or(best, |last| alike(shape, best, last));
-    best.is_believed().then_some(best)
+    best.is_believed().then(|| last.map_or(best.in_world, |last| alike(shape, best.in_world, last)))
 }
 
 fn yaw(turn_rad: f32) -> Rotation {
@@ -185,14 +184,31 @@ fn judged(shape: &Shape, points: &[Vec3], in_world: Pose) -> Fit {
 }
 
 /// The same as it was seen before: of the turns that look alike the nearest.
-fn alike(shape: &Shape, found: Fit, last: &Pose) -> Fit {
+fn alike(shape: &Shape, found: Pose, last: &Pose) -> Pose {
     let period_rad = period_rad(shape);
     let n_turns = (2.0 * PI / period_rad).round() as u32;
-    let turned = |turn: u32| yaw(period_rad * turn as f32) * found.in_world.rotation;
-    let nearest =
-        (0..n_turns).map(turned).min_by(|a, b| a.angle_to(&last.rotation).total_cmp(&b.angle_to(&last.rotation)));
-    let rotation = nearest.unwrap_or(found.in_world.rotation);
-    Fit { in_world: Pose::from_parts(found.in_world.translation, rotation), ..found }
+    let turned = |turn: u32| yaw(period_rad * turn as f32) * found.rotation;
+    let off_rad = |rotation: &Rotation| rotation.angle_to(&last.rotation);
+    let nearest = (0..n_turns).map(turned).min_by(|a, b| off_rad(a).total_cmp(&off_rad(b)));
+    Pose::from_parts(found.translation, nearest.unwrap_or(found.rotation))
+}
+
+/// How large a body's outline is as a camera at `eye` sees it with nothing before it, at a focal length of 1. Nothing for
+/// what is hollow, which hides parts of itself.
+pub(super) fn outline(shape: &Shape, in_world: &Pose, eye: &Vec3) -> f32 {
+    if shape.rim_m().is_some() {
+        return 0.0;
+    }
+    let to_eye = eye - in_world.translation.vector;
+    let toward = in_world.rotation.inverse_transform_vector(&to_eye).abs().normalize();
+    let half = shape.half_extents_m();
+    let sides = Vec3::new(half.y * half.z, half.x * half.z, half.x * half.y) * 4.0;
+    let part = match shape {
+        Shape::Ball { .. } => FRAC_PI_4 / toward.sum(),
+        Shape::Cylinder { .. } => FRAC_PI_4,
+        _ => 1.0,
+    };
+    part * sides.dot(&toward) / to_eye.norm_squared()
 }
 
 #[cfg(test)]
@@ -214,8 +230,8 @@ mod tests {
         for turn_rad in [0.0, 0.3, 0.7, 1.2] {
             let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.075), turn_rad);
             let found = locate(&shape, &seen_of_cube(0.025, &in_world), &Vec3::new(0.3, -1.0, 1.0), None).unwrap();
-            let off_m = (found.in_world.translation.vector - in_world.translation.vector).norm();
-            let turn = (crate::geometry::yaw_rad(&found.in_world) - turn_rad).rem_euclid(FRAC_PI_2);
+            let off_m = (found.translation.vector - in_world.translation.vector).norm();
+            let turn = (crate::geometry::yaw_rad(&found) - turn_rad).rem_euclid(FRAC_PI_2);
             assert!(off_m < 1e-4, "{turn_rad}: {off_m}");
             assert!(turn.min(FRAC_PI_2 - turn) < 1e-3, "{turn_rad}: {turn}");
         }
@@ -227,7 +243,7 @@ mod tests {
         let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.025), 0.3 + FRAC_PI_2);
         let last = crate::geometry::upright(Vec3::new(0.11, -0.05, 0.025), 0.25 + PI);
         let found = locate(&shape, &seen_of_cube(0.025, &in_world), &Vec3::new(0.3, -1.0, 1.0), Some(&last)).unwrap();
-        assert!((crate::geometry::yaw_rad(&found.in_world) - (0.3 - PI)).abs() < 1e-3);
+        assert!((crate::geometry::yaw_rad(&found) - (0.3 - PI)).abs() < 1e-3);
     }
 
     #[test]
@@ -237,6 +253,19 @@ mod tests {
         let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, 0.025), 0.3);
         assert_eq!(locate(&shape, &seen_of_cube(0.025, &in_world)[..19], &eye, None), None);
         assert_eq!(locate(&shape, &seen_of_cube(0.1, &in_world), &eye, None), None);
+    }
+
+    #[test]
+    fn an_outline_is_that_of_the_sides_that_face_the_camera() {
+        let at = Pose::translation(0.0, 0.0, 0.0);
+        let brick = Shape::Cuboid { half_extents_m: [0.1, 0.2, 0.3] };
+        // From above, 2 m away: 0.2 by 0.4 m.
+        assert!((outline(&brick, &at, &Vec3::new(0.0, 0.0, 2.0)) - 0.08 / 4.0).abs() < 1e-6);
+        // A ball of 0.1 m from anywhere: a disk.
+        let ball = Shape::Ball { radius_m: 0.1 };
+        let disk = PI * 0.01;
+        assert!((outline(&ball, &at, &Vec3::new(1.0, 0.0, 0.0)) - disk).abs() < 1e-5);
+        assert!((outline(&ball, &at, &Vec3::new(0.6, 0.0, 0.8)) - disk).abs() < 1e-5);
     }
 
     #[test]
@@ -252,8 +281,8 @@ mod tests {
         });
         let points: Vec<Vec3> = points.map(|point| lying.transform_point(&point.into()).coords).collect();
         let found = locate(&shape, &points, &Vec3::new(0.0, -0.95, 0.95), None).unwrap();
-        let axis = found.in_world.rotation * Vec3::z();
+        let axis = found.rotation * Vec3::z();
         assert!(axis.z.abs() < 1e-3, "it stands: {axis:?}");
-        assert!((found.in_world.translation.vector - lying.translation.vector).norm() < 2e-3);
+        assert!((found.translation.vector - lying.translation.vector).norm() < 2e-3);
     }
 }

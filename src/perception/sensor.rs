@@ -32,13 +32,22 @@ const MOST_ANGLE_RAD: f32 = 1.4;
 pub(super) struct Cloud {
     pub(super) table: Vec<Vec3>,
     /// Of each body.
-    pub(super) bodies: Vec<Vec<Vec3>>,
+    pub(super) bodies: Vec<Shown>,
+}
+
+/// What shows a body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Shown {
+    /// How many pixels of the picture.
+    pub(super) n_pixels: usize,
+    /// Points of its surface, not of all of them.
+    pub(super) points: Vec<Vec3>,
 }
 
 impl Cloud {
     /// The same with something added to all depths.
     pub(super) fn farther_by(mut self, offset_m: f32) -> Self {
-        let all = self.table.iter_mut().chain(self.bodies.iter_mut().flatten());
+        let all = self.table.iter_mut().chain(self.bodies.iter_mut().flat_map(|shown| &mut shown.points));
         all.for_each(|point| *point *= (point.z + offset_m) / point.z);
         self
     }
@@ -72,11 +81,14 @@ pub(super) fn measure(
         };
         pixels.iter().filter_map(pixel).collect()
     };
-    Cloud { table: points(&table), bodies: bodies.iter().map(|pixels| points(pixels)).collect() }
+    let table = points(&table);
+    let shown = |(n_pixels, pixels): &(usize, Vec<u32>)| Shown { n_pixels: *n_pixels, points: points(pixels) };
+    let bodies = bodies.iter().map(shown).collect();
+    Cloud { table, bodies }
 }
 
-/// The pixels that are measured: of the table and of each body, evenly.
-fn pixels(picture: &Picture, n_bodies: usize) -> (Vec<u32>, Vec<Vec<u32>>) {
+/// The pixels that are measured: of the table and of each body, evenly, after how many the body has.
+fn pixels(picture: &Picture, n_bodies: usize) -> (Vec<u32>, Vec<(usize, Vec<u32>)>) {
     let first = Segment::Body(crate::scene::BodyIndex(0)).number();
     let table_number = Segment::Table.number();
     let mut table = Vec::new();
@@ -93,7 +105,7 @@ fn pixels(picture: &Picture, n_bodies: usize) -> (Vec<u32>, Vec<Vec<u32>>) {
     }
     let thinned = |pixels: Vec<u32>| {
         let stride = pixels.len().div_ceil(MOST_POINTS).max(1);
-        pixels.into_iter().step_by(stride).collect()
+        (pixels.len(), pixels.into_iter().step_by(stride).collect())
     };
     (table, bodies.into_iter().map(thinned).collect())
 }
@@ -174,9 +186,12 @@ mod tests {
 
     #[test]
     fn what_is_added_to_depths_moves_points_along_their_rays() {
-        let cloud = Cloud { table: vec![Vec3::new(1.0, 0.5, 2.0)], bodies: vec![vec![Vec3::new(0.0, 0.0, 1.0)]] };
+        let cloud = Cloud {
+            table: vec![Vec3::new(1.0, 0.5, 2.0)],
+            bodies: vec![Shown { n_pixels: 1, points: vec![Vec3::new(0.0, 0.0, 1.0)] }],
+        };
         let farther = cloud.farther_by(0.5);
         assert_eq!(farther.table, [Vec3::new(1.25, 0.625, 2.5)]);
-        assert_eq!(farther.bodies, [[Vec3::new(0.0, 0.0, 1.5)]]);
+        assert_eq!(farther.bodies[0].points, [Vec3::new(0.0, 0.0, 1.5)]);
     }
 }
