@@ -31,7 +31,7 @@ pub use config::{PerceptionConfig, PerceptionError, Sensor, Stand};
 
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::render::{Camera, Letters, Look, Mount, Renderer, Shadows};
-use crate::scene::{BodyIndex, Scene, SceneState};
+use crate::scene::{BodyIndex, Mobility, Scene, SceneState};
 use crate::seed::Seed;
 use crate::task::Family;
 
@@ -121,7 +121,8 @@ impl Perception {
         self.look(scene, &alone);
     }
 
-    /// Looks at the table as it is now. What is in the gripper the robot knows without looking.
+    /// Looks at the table as it is now. What is in the gripper the robot knows without looking, and what is fixed it looks
+    /// for until it has found it.
     pub fn look(&mut self, scene: &Scene, state: &SceneState) {
         let seed = self.seed.derive("look", &[self.n_looks]);
         self.n_looks += 1;
@@ -133,7 +134,8 @@ impl Perception {
         let eye = camera_in_world.translation.vector;
         for (index, Shown { n_pixels, points }) in cloud.bodies.iter().enumerate() {
             let body = BodyIndex(index as u16);
-            if state.held == Some(body) {
+            let is_fixed = scene.body(body).mobility == Mobility::Fixed;
+            if state.held == Some(body) || is_fixed && self.memory[index].is_known {
                 continue;
             }
             let in_world = |point: &Vec3| camera_in_world.transform_point(&(*point).into()).coords;

@@ -193,20 +193,17 @@ fn alike(shape: &Shape, found: Pose, last: &Pose) -> Pose {
     Pose::from_parts(found.translation, nearest.unwrap_or(found.rotation))
 }
 
-/// How large a body's outline is as a camera at `eye` sees it with nothing before it, at a focal length of 1. Nothing for
-/// what is hollow, which hides parts of itself.
+/// How large a body's outline is as a camera at `eye` sees it with nothing before it, at a focal length of 1; of a bowl
+/// about.
 pub(super) fn outline(shape: &Shape, in_world: &Pose, eye: &Vec3) -> f32 {
-    if shape.rim_m().is_some() {
-        return 0.0;
-    }
     let to_eye = eye - in_world.translation.vector;
     let toward = in_world.rotation.inverse_transform_vector(&to_eye).abs().normalize();
     let half = shape.half_extents_m();
     let sides = Vec3::new(half.y * half.z, half.x * half.z, half.x * half.y) * 4.0;
     let part = match shape {
         Shape::Ball { .. } => FRAC_PI_4 / toward.sum(),
-        Shape::Cylinder { .. } => FRAC_PI_4,
-        _ => 1.0,
+        Shape::Cylinder { .. } | Shape::Bowl(_) => FRAC_PI_4,
+        Shape::Cuboid { .. } | Shape::OpenBox { .. } => 1.0,
     };
     part * sides.dot(&toward) / to_eye.norm_squared()
 }
