@@ -8,7 +8,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use crate::geometry::{Pose, Rotation, Vec3};
 use crate::perception::surface;
-use crate::scene::Shape;
+use crate::scene::{Bowl, Shape};
 
 /// Fewer points tell nothing.
 const LEAST_POINTS: usize = 20;
@@ -112,24 +112,37 @@ fn stances(shape: &Shape) -> Vec<(Rotation, f32)> {
         Shape::Cuboid { half_extents_m: [x, y, z] } => vec![(upright, z), (x_up, x), (y_up, y)],
         Shape::Cylinder { radius_m, half_height_m } => vec![(upright, half_height_m), (x_up, radius_m)],
         Shape::Ball { radius_m } => vec![(upright, radius_m)],
-        Shape::OpenBox { .. } | Shape::Bowl(_) => vec![(upright, shape.rim_m().unwrap_or(0.0))],
+        // Most points are of the rim, or of the floor.
+        Shape::OpenBox { inner_m: [.., height_m], .. } | Shape::Bowl(Bowl { height_m, .. }) => {
+            vec![(upright, height_m), (upright, 0.0)]
+        }
     }
 }
 
-/// About where the body's middle is: behind the middle of its points, as the camera sees them.
+/// About where the body's middle is: behind the middle of its points, as the camera sees them; of what has a rim in the
+/// middle of that.
 fn start(shape: &Shape, points: &[Vec3], eye: &Vec3) -> Vec3 {
+    let z = top_z(points) - shape.half_extents_m().z;
+    if shape.rim_m().is_some() {
+        let [x, y] = [0, 1].map(|axis| (level(points, axis, 0.02) + level(points, axis, 0.98)) / 2.0);
+        return Vec3::new(x, y, z);
+    }
     let middle = points.iter().sum::<Vec3>() / points.len() as f32;
     let away = Vec3::new(middle.x - eye.x, middle.y - eye.y, 0.0).try_normalize(1e-6).unwrap_or_default();
-    let behind_m = if shape.rim_m().is_some() { 0.0 } else { 0.4 * shape.half_extents_m().min() };
-    let center = middle + away * behind_m;
-    Vec3::new(center.x, center.y, top_z(points) - shape.half_extents_m().z)
+    let center = middle + away * (0.4 * shape.half_extents_m().min());
+    Vec3::new(center.x, center.y, z)
 }
 
 /// The height that nine points of ten are below.
 fn top_z(points: &[Vec3]) -> f32 {
-    let mut heights: Vec<f32> = points.iter().map(|point| point.z).collect();
-    let at = heights.len() * 9 / 10;
-    *heights.select_nth_unstable_by(at, f32::total_cmp).1
+    level(points, 2, 0.9)
+}
+
+/// What a share of the points is below, along an axis.
+fn level(points: &[Vec3], axis: usize, share: f32) -> f32 {
+    let mut along: Vec<f32> = points.iter().map(|point| point[axis]).collect();
+    let at = (along.len().saturating_sub(1) as f32 * share) as usize;
+    *along.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
 fn fit(shape: &Shape, points: &[Vec3], start: &Pose) -> Fit {
@@ -263,6 +276,70 @@ mod tests {
         let disk = PI * 0.01;
         assert!((outline(&ball, &at, &Vec3::new(1.0, 0.0, 0.0)) - disk).abs() < 1e-5);
         assert!((outline(&ball, &at, &Vec3::new(0.6, 0.0, 0.8)) - disk).abs() < 1e-5);
+    }
+
+    /// What a camera sees of a body: where rays 3 mm apart meet its surface.
+    fn seen(shape: &Shape, in_world: &Pose, eye: &Vec3) -> Vec<Vec3> {
+        let forward = (in_world.translation.vector - eye).normalize();
+        let right = forward.cross(&Vec3::z()).normalize();
+        let up = right.cross(&forward);
+        let grid = (-60..=60).flat_map(|row| (-60..=60).map(move |column| (column as f32, row as f32)));
+        let ray = |(column, row): (f32, f32)| {
+            let to = in_world.translation.vector + right * (0.003 * column) + up * (0.003 * row);
+            let way = (to - eye).normalize();
+            let mut along_m = 0.0;
+            for _ in 0..200 {
+                let point = eye + way * along_m;
+                let in_body = in_world.inverse_transform_point(&point.into()).coords;
+                let (distance_m, _) = surface::distance(shape, &in_body);
+                if distance_m < 1e-4 {
+                    return Some(point);
+                }
+                along_m += distance_m;
+                if along_m > 3.0 {
+                    return None;
+                }
+            }
+            None
+        };
+        let hits: Vec<Vec3> = grid.filter_map(ray).collect();
+        let stride = hits.len().div_ceil(240).max(1);
+        hits.into_iter().step_by(stride).collect()
+    }
+
+    #[test]
+    fn every_form_is_found_from_what_a_camera_sees_of_it() {
+        let bowl = crate::scene::Bowl {
+            floor_radius_m: 0.042,
+            rim_radius_m: 0.0645,
+            height_m: 0.045,
+            wall_m: 0.0035,
+            foot_radius_m: 0.028,
+            foot_height_m: 0.0165,
+        };
+        let shapes = [
+            Shape::Cuboid { half_extents_m: [0.025; 3] },
+            Shape::Cuboid { half_extents_m: [0.028, 0.015, 0.015] },
+            Shape::Cuboid { half_extents_m: [0.035, 0.0045, 0.003] },
+            Shape::Cylinder { radius_m: 0.0175, half_height_m: 0.02 },
+            Shape::Ball { radius_m: 0.018 },
+            Shape::OpenBox { inner_m: [0.09, 0.09, 0.02], wall_m: 0.005 },
+            Shape::Bowl(bowl),
+        ];
+        for (shape, turn_rad) in shapes.iter().flat_map(|shape| [0.1, 0.5, 1.0].map(|turn| (shape, turn))) {
+            let in_world = crate::geometry::upright(Vec3::new(0.1, -0.05, shape.foot_m()), turn_rad);
+            let eye = Vec3::new(-0.2, 1.0, 1.0);
+            let points = seen(shape, &in_world, &eye);
+            let found = locate(shape, &points, &eye, None);
+            // A wall's inner side may be taken for its outer one.
+            let most_m = if let Shape::OpenBox { wall_m, .. } = shape { *wall_m } else { 1e-3 };
+            let off_m = found.map(|found| (found.translation.vector - in_world.translation.vector).norm());
+            assert!(
+                off_m.is_some_and(|off_m| off_m < most_m),
+                "{shape:?} turned by {turn_rad}: {off_m:?} of {}",
+                points.len()
+            );
+        }
     }
 
     #[test]
