@@ -236,6 +236,25 @@ fn a_manifest_that_names_a_place_outside_of_the_run_is_refused() {
 }
 
 #[test]
+fn a_run_in_a_store_is_submitted_and_its_directory_holds_scripts_alone() {
+    let machines = Machines::new();
+    let (store, out) = (machines.store(), machines.folder.path().join("submitted"));
+    let (store, path) = (store.to_string_lossy(), out.to_string_lossy());
+    let submit = ["submit", PIPELINE, "--out", path.as_ref(), "--engine", "local", "--store", store.as_ref()];
+    let scratch = machines.scratch("tmp");
+    std::fs::create_dir(&scratch).unwrap();
+    let output = ntp(&submit).env("TMPDIR", &scratch).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let (code, stdout, stderr) = run(&["status", &path]);
+    assert!(code == 0 && stdout.contains("rollout: 2 of 2 items done"), "{stdout} {stderr}");
+    let names = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name());
+    assert_eq!(names.collect::<Vec<_>>(), ["submit"]);
+    assert_eq!(hashes(&machines.fetched(), &ALL[..5]), hashes(smoke::whole(), &ALL[..5]));
+    let (code, _, stderr) = run(&["submit", PIPELINE, "--out", &path, "--engine", "local"]);
+    assert!(code == 2 && stderr.contains("was made with another store; --force"), "{stderr}");
+}
+
+#[test]
 fn a_store_is_of_one_experiment_and_a_bucket_needs_its_feature() {
     let machines = Machines::new();
     let scratch = machines.scratch("a");
