@@ -256,7 +256,7 @@ impl SuiteFacts {
         let push = self.push_percent().zip(self.push_mns()).filter(|&(percent, _)| percent > 0);
         words.extend(push.map(|(percent, mns)| format!("a push of {mns} mN\u{202f}s at {percent} %")));
         words.extend(self.robot.as_deref().map(|robot| format!("acted by {}", capitalized(robot))));
-        words.extend(self.camera_words().map(|camera| format!("seen by a {camera}")));
+        words.extend(self.camera_words().map(|camera| format!("seen by the {camera}")));
         words.extend(self.jaw_m.map(|_| format!("a gripper that opens {} mm", self.jaw_mm())));
         let [frame, offset] = self.noise_mm();
         words.extend((frame > 0).then(|| format!("positions off by {frame} mm")));
