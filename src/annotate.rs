@@ -23,8 +23,10 @@
 //! [`AnnotateError`] names the dataset or model. Nothing is under the final name unless all of it is.
 
 mod annotation;
+mod confidence;
 mod doubt;
 mod error;
+mod gripper_changes;
 mod key_frames;
 mod measure;
 mod model;

@@ -60,7 +60,7 @@ pub use colour_slots::{ColourSlots, ColourSlotsConfig};
 pub use config::{ModelConfig, NetworkConfig};
 pub use core_kind::CoreKind;
 pub use core_network::{Cell, Core, Gru, GruCore, Lstm, LstmCore, Reactive, Recurrent};
-pub use decoder::{Decoder, LabelScores, span_score};
+pub use decoder::{Decoder, LabelScores, span_from, span_score};
 pub use detecting::{Detecting, Detections, detected_rows};
 pub use detector::{
     DetectionLoss, Detector, DetectorDefaults, PointDetector, PointDetectorConfig, VggDetector, VggDetectorConfig,

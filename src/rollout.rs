@@ -28,5 +28,5 @@ pub use interpreter::{Eye, Limits, RolloutEpisode, RolloutError, Sight, Start, r
 pub use learned::{LearnedPolicy, load_policy, load_policy_on};
 pub use noisy::Noisy;
 pub use oracle::Oracle;
-pub use policy::{Decision, Policy, PolicyError, Query, Specification};
+pub use policy::{Allowed, Decision, Policy, PolicyError, Query, Specification};
 pub use rows::{Acted, RolloutRows, SCHEMA as ROLLOUTS};

@@ -32,6 +32,10 @@ const SHIFT_M: f32 = 0.12;
 const PAUSE_PACE: f32 = 0.5;
 /// The least height from which a gripper goes down to a thing, in metres.
 const WAY_DOWN_M: f32 = 0.015;
+/// What stays within this of where it is in the end rests, in metres.
+const REST_M: f32 = 0.002;
+/// A rest at the end that is no longer than this belongs to the last primitive, which waits for it, in seconds.
+const REST_SECS: f64 = 0.35;
 /// A change of the gripper that lasts shorter is a flicker, in frames.
 const FLICKER_FRAMES: usize = 2;
 
@@ -54,7 +58,8 @@ pub fn key_frames(episode: &ObservedEpisode) -> Vec<KeyFrame> {
         let begin = keys.last().map_or(0, |key| key.frame as usize);
         let until = changes.get(number + 1).map_or(path.len(), |&next| next);
         let place = resting(&path, begin, change);
-        let end = leaves(&path, place, until).max(place);
+        let leaves = leaves(&path, place, until).max(place);
+        let end = if until == path.len() { leaves.min(rests(episode).max(place)) } else { leaves };
         let hover = hover(&path, begin, place);
         if hover > begin && hover < end {
             keys.push(KeyFrame { frame: hover as u32, closed: closed[change - 1] });
@@ -130,6 +135,20 @@ fn leaves(path: &[[f32; 3]], change: usize, until: usize) -> usize {
     let Some(&place) = path.get(change) else { return change };
     let stays = path[change..until].iter().take_while(|&&at| distance_m(at, place) < STILL_M).count();
     change + stays.max(1) - 1
+}
+
+/// The frame from which on nothing moves any more; the last where that is hardly before the end.
+fn rests(episode: &ObservedEpisode) -> usize {
+    let rows = &episode.observations;
+    let last = rows.len().saturating_sub(1);
+    let Some(end) = rows.get(last) else { return last };
+    let is_there = |frame: &usize| {
+        let row = rows.get(*frame);
+        row.is_some_and(|row| row.positions.iter().zip(end.positions).all(|(&now, &then)| distance_m(now, then) < REST_M))
+    };
+    let rests = last - (0..last).rev().take_while(is_there).count();
+    let secs = |frame: usize| episode.times_secs.get(frame).copied().unwrap_or(0.0);
+    if secs(last) - secs(rests) > REST_SECS { rests } else { last }
 }
 
 /// The frame behind `begin` at which the gripper hovers, before it goes down to where it changes.
@@ -216,6 +235,29 @@ mod tests {
         let (hover, leaves, episode) = grasp();
         let keys = key_frames(&episode).into_iter().map(|key| (key.frame as usize, key.closed));
         assert_eq!(keys.collect::<Vec<_>>(), [(0, false), (hover, false), (leaves, true)]);
+    }
+
+    #[test]
+    fn what_comes_after_everything_has_come_to_rest_is_no_part_of_the_last_primitive() {
+        let (_, _, mut episode) = grasp();
+        let n_frames = episode.n_frames();
+        let last = episode.observations.get(n_frames - 1).unwrap();
+        let last = Observation { slots_m: last.positions.to_vec(), closed: !last.is_open() };
+        let opened = Observation { closed: false, ..last };
+        let mut rest = |n: usize| {
+            let rows = &episode.observations;
+            let row = |row: crate::trace::ObservationRow<'_>| Observation {
+                slots_m: row.positions.to_vec(),
+                closed: !row.is_open(),
+            };
+            let all: Vec<Observation> = rows.iter().map(row).chain(vec![opened.clone(); n]).collect();
+            episode.observations = ObservationRows::of(3, &all);
+            episode.times_secs = (0..all.len()).map(|frame| frame as f64 / 10.0).collect();
+            key_frames(&episode).last().map(|key| key.frame as usize)
+        };
+        assert_eq!(rest(3), Some(n_frames + 2), "it waits for what it set down");
+        // The gripper opens one frame after the last motion: nothing moves from there on.
+        assert_eq!(rest(20), Some(n_frames));
     }
 
     #[test]

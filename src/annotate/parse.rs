@@ -7,12 +7,14 @@
 //! # Source
 //!
 //! Paper, section IV, read backwards: scoping divides a demonstration among programs, and where they begin and end is
-//! what an annotator would write down. Ours: a root asks for the *first* part that shows what is to be done. Where such
-//! a part lies behind (the second of several alike) it is asked again with what is left of the demonstration.
+//! what an annotator would write down. Ours: a part begins where its caller is, and what the gripper does bounds it. A
+//! root names the *first* part that shows what is to be done; the second of several alike lies behind that.
 
 use std::sync::Arc;
 
 use crate::annotate::Doubt;
+use crate::annotate::confidence::confidence;
+use crate::annotate::gripper_changes::GripperChanges;
 use crate::model::Pictures;
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, PolicyError, Query, Specification};
@@ -59,20 +61,21 @@ pub fn parse(
 
 /// How many decisions there may be for each key frame. An expert's tree has eleven for four.
 const DECISIONS_OF_A_FRAME: u32 = 8;
+/// Programs that run at a time. An expert's tree has three of them.
+const DEEPEST: usize = 8;
 
 /// A demonstration on its way.
 struct Walk {
     specification: Arc<Specification>,
     states: ObservationRows,
     seen: Arc<Pictures>,
+    changes: GripperChanges,
     n_frames: u32,
     /// The key frame that programs are at.
     at: u32,
     calls: Vec<ProgramCall>,
     confidences: Vec<f32>,
     running: Vec<Running>,
-    /// What the root decided on a part that lies behind; it is asked again, with what is left.
-    behind: Option<(Decision, Span)>,
     n_decisions: u32,
     doubts: Vec<Doubt>,
 }
@@ -107,13 +110,13 @@ impl Walk {
         Self {
             specification: Arc::new(Specification::observed(states.clone())),
             states: states.clone(),
+            changes: GripperChanges::of(states),
             seen: Arc::default(),
             n_frames,
             at: 0,
             calls: vec![call],
             confidences: vec![1.0],
             running: vec![Running { call: 0, scope: whole, n_steps: 0, primitive: None }],
-            behind: None,
             n_decisions: 0,
             doubts: Vec::new(),
         }
@@ -122,42 +125,33 @@ impl Walk {
     /// What to ask the policy now; nothing when all programs have ended.
     fn query(&self, episode: usize) -> Option<Query> {
         let top = self.running.last()?;
-        let rest = Span { begin: self.at, end: self.n_frames };
         Some(Query {
             episode,
             decision: self.n_decisions,
             depth: (self.running.len() - 1) as u8,
             step: top.n_steps,
             specification: Arc::clone(&self.specification),
-            window: if self.behind.is_some() { rest } else { top.scope },
+            window: top.scope,
             program: self.calls[top.call].program,
             observation: observation(&self.states, self.at),
             seen: Arc::clone(&self.seen),
+            allowed: self.changes.allowed(self.at, top.scope, top.call == 0),
         })
     }
 
     /// Takes a decision down, made of what `window` shows.
     fn step(&mut self, window: Span, decision: Decision) {
         self.n_decisions += 1;
-        let is_part = decision.program.is_composite();
-        let is_root = self.running.len() == 1;
-        let (decision, window) = match self.behind.take() {
-            Some(first) => self.again(first, (decision, window)),
-            None if is_root && is_part && decision.scope.begin < self.at => {
-                self.behind = Some((decision, window));
-                return;
-            }
-            None => (decision, window),
-        };
         let last = self.n_frames.saturating_sub(1);
-        if self.n_decisions > DECISIONS_OF_A_FRAME * (self.n_frames + 1) {
+        let is_endless = self.n_decisions > DECISIONS_OF_A_FRAME * (self.n_frames + 1) || self.running.len() > DEEPEST;
+        if is_endless {
             self.doubts.push(Doubt::Endless);
             return self.break_off();
         }
         if decision.program != Program::None && self.at == last {
             return self.run_out(&decision);
         }
-        let (decision, confidence) = self.seen(self.at_hand(decision.clone()), confidence(&decision, window));
+        let (decision, confidence) = self.seen(self.at_hand(decision), window);
         match decision.program {
             Program::None => {
                 self.call(&decision, None, confidence);
@@ -172,28 +166,23 @@ impl Walk {
         }
     }
 
-    /// What is done with a second answer, of what is left alone: it counts where it is of the same program and begins
-    /// here. Else what was found first is there once more, and is as long as it was.
-    fn again(&self, first: (Decision, Span), second: (Decision, Span)) -> (Decision, Span) {
-        let is_same = second.0.program == first.0.program && second.0.scope.begin == self.at;
-        if is_same { second } else { first }
-    }
-
-    /// The decision that the gripper shows. Where it closes or opens by the next key frame, a program of primitives has
-    /// called `grip` or `release`, whatever the policy takes the state for; and with these such a program ends.
-    fn seen(&self, decision: Decision, confidence: f32) -> (Decision, f32) {
-        let is_open = |frame: u32| self.states.get(frame as usize).is_none_or(|state| state.is_open());
-        let changed = match (is_open(self.at), is_open(self.at + 1)) {
-            (true, false) => Program::Grip,
-            (false, true) => Program::Release,
-            _ => return (decision, confidence),
-        };
-        if !decision.program.is_primitive() || decision.program == changed {
+    /// The decision that the gripper shows, and how sure it is. Where it closes or opens by the next key frame, a program
+    /// of primitives has called `grip` or `release` and ends, whatever the policy takes the state for; before, it moves.
+    fn seen(&self, mut decision: Decision, window: Span) -> (Decision, f32) {
+        if self.changes.is_none() || !decision.program.is_primitive() {
+            let confidence = confidence(&decision, window);
             return (decision, confidence);
         }
-        let probability = decision.prediction.as_ref().map_or(1.0, |prediction| prediction.program_probability);
-        let (argument, end_of_program) = (None, true);
-        (Decision { program: changed, argument, end_of_program, ..decision }, (1.0 - probability).min(0.4))
+        let change = self.changes.next(self.at);
+        let part = self.running.last().map_or(window, |top| top.scope);
+        decision.end_of_program = change.is_some() || !self.changes.has_ahead(self.at + 1, part);
+        let confidence = confidence(&decision, window);
+        match change {
+            Some(changed) if changed != decision.program => {
+                (Decision { program: changed, argument: None, ..decision }, confidence.min(UNSEEN))
+            }
+            _ => (decision, confidence),
+        }
     }
 
     /// A part that lies behind, at the present frame.
@@ -275,15 +264,27 @@ impl Walk {
                 let (call, found, at) = (ended.call as u32, ended.scope.last(), self.at);
                 self.doubts.push(Doubt::ScopeEnds { call, found, at });
             }
-            if !is_root {
+            if !is_root && !self.changes.has_ahead(self.at, ended.scope) {
                 self.wait_until(ended.scope.last(), ended.primitive);
             }
-            let at = self.at;
+            let (at, ends_caller) = (self.at, self.ends_caller(ended.call));
             let call = &mut self.calls[ended.call];
             call.frames.end = if is_root { call.frames.end } else { at + 1 };
-            if !call.end_of_program {
+            call.end_of_program = ends_caller;
+            if !ends_caller {
                 break;
             }
+        }
+    }
+
+    /// Whether a call that returns was its caller's last: as was decided, unless the gripper shows otherwise. A root goes
+    /// on until it calls nothing.
+    fn ends_caller(&self, call: usize) -> bool {
+        let decided = self.calls[call].end_of_program;
+        match self.running.last() {
+            Some(caller) if self.changes.has_ahead(self.at, caller.scope) => false,
+            Some(caller) if caller.call != 0 && !self.changes.is_none() => true,
+            _ => decided,
         }
     }
 
@@ -370,30 +371,10 @@ impl Walk {
     }
 }
 
+/// How sure a call is at most that the policy did not make.
+const UNSEEN: f32 = 0.4;
 /// A gripper that hovers is not farther beside the middle of a thing than this, in metres: half of a small container.
 const REACH_M: f32 = 0.06;
-
-/// The product of the probabilities of what was decided.
-fn confidence(decision: &Decision, window: Span) -> f32 {
-    let Some(prediction) = &decision.prediction else { return 1.0 };
-    let ends = prediction.end_probability;
-    let ends = if decision.program == Program::None {
-        1.0
-    } else if decision.end_of_program {
-        ends
-    } else {
-        1.0 - ends
-    };
-    let of = |probabilities: &[f32], frame: u32| {
-        let at = frame.checked_sub(window.begin).and_then(|at| probabilities.get(at as usize));
-        at.copied().unwrap_or(1.0)
-    };
-    let Span { begin, .. } = decision.scope;
-    let starts = of(&prediction.start_probabilities, begin);
-    // A part of one frame has no end of its own.
-    let stops = if decision.scope.len() > 1 { of(&prediction.stop_probabilities, decision.scope.last()) } else { 1.0 };
-    prediction.program_probability * decision.argument_probability * ends * starts * stops
-}
 
 fn observation(states: &ObservationRows, frame: u32) -> Observation {
     states.get(frame as usize).map_or_else(

@@ -68,6 +68,16 @@ pub fn span_score(frames: &[LabelScores], span: Span) -> f32 {
     (span.begin..span.end).map(|frame| odds(&frames[frame as usize], span.label(frame))).sum()
 }
 
+/// The likeliest span that begins at a frame and ends at one of `lasts`, or at any where there is none; nothing beyond
+/// the frames.
+pub fn span_from(frames: &[LabelScores], begin: u32, lasts: &[u32]) -> Option<Span> {
+    let any: Vec<u32> = if lasts.is_empty() { (begin..frames.len() as u32).collect() } else { lasts.to_vec() };
+    let spans = any.into_iter().filter_map(|last| Span::new(begin, last + 1));
+    let within: Vec<Span> = spans.filter(|span| span.end as usize <= frames.len()).collect();
+    let best = first_max(within.iter().map(|span| span_score(frames, *span)))?;
+    within.get(best).copied()
+}
+
 /// The first and last frame of the span with the highest [`span_score`], in one pass: up to each frame it is enough to
 /// know the best span that is still open there.
 fn likeliest_span(frames: &[LabelScores]) -> Option<(usize, usize)> {

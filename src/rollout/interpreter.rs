@@ -207,6 +207,7 @@ impl<'t> Running<'t> {
             program: top.program,
             observation: self.world.observe(),
             seen: Arc::clone(&self.seen),
+            allowed: None,
         })
     }
 

@@ -19,10 +19,10 @@ use rayon::iter::{
 
 use crate::model::{
     self, CalledWith, CoreOutput, Decoder, LabelScores, MAX_ARGUMENTS, ModelConfig, ModelError, Network, NetworkUse,
-    PictureIndex, Pictures, ReadError, ScopingKind, States, Windows, scalar, values,
+    PictureIndex, Pictures, ReadError, ScopingKind, States, Windows, scalar, span_from, values,
 };
 use crate::program::Program;
-use crate::rollout::{Decision, Policy, PolicyError, Query, Specification};
+use crate::rollout::{Allowed, Decision, Policy, PolicyError, Query, Specification};
 use crate::scene::SlotIndex;
 use crate::trace::{ObservationRows, Prediction, ScopingLabel, Span, SpecificationForm};
 
@@ -208,13 +208,11 @@ impl<N: Network> LearnedPolicy<N> {
     ) -> Result<(Decision, Arguments), ReadError> {
         let end_probability = logistic(finite(scalar(core.end.clone())?, "the end of the program")?);
         let programs = all_finite(core.programs.clone(), "the next program")?;
-        let (program, program_probability) = likeliest_program(programs, self.network.scoping());
+        let allowed = query.allowed.as_ref();
+        let (program, program_probability) = likeliest_program(programs, self.network.scoping(), allowed);
         let labels = program.is_composite().then(|| self.network.scope(reading, query.program.into(), core)).flatten();
         let labels: Vec<LabelScores> = labels.map(label_scores).transpose()?.unwrap_or_default();
-        let scope = self
-            .decoder
-            .decode(&labels)
-            .map(|within| Span { begin: query.window.begin + within.begin, end: query.window.begin + within.end });
+        let scope = self.scope(&labels, query);
         let (arguments, argument_probability) = self.arguments(reading, query, core, program)?;
         let probabilities =
             |label: ScopingLabel| labels.iter().map(|scores| scores[label as usize].exp()).collect::<Vec<f32>>();
@@ -232,6 +230,20 @@ impl<N: Network> LearnedPolicy<N> {
             }),
         };
         Ok((decision, arguments))
+    }
+
+    /// The part that a callee is given; nothing without labels.
+    fn scope(&self, labels: &[LabelScores], query: &Query) -> Option<Span> {
+        let window = query.window;
+        let within = match &query.allowed {
+            Some(Allowed { begin, lasts, .. }) if window.contains_frame(*begin) && !labels.is_empty() => {
+                let lasts = lasts.iter().filter(|&&last| *begin <= last && window.contains_frame(last));
+                let lasts: Vec<u32> = lasts.map(|last| last - window.begin).collect();
+                span_from(labels, begin - window.begin, &lasts)
+            }
+            _ => self.decoder.decode(labels),
+        };
+        within.map(|within| Span { begin: window.begin + within.begin, end: window.begin + within.end })
     }
 
     /// The slots that a program is called with, and how likely the first of them is.
@@ -321,15 +333,22 @@ fn logistic(logit: f32) -> f32 {
     1.0 / (1.0 + (-logit).exp())
 }
 
-/// The likeliest program that may be called, and its probability among those.
-fn likeliest_program(mut logits: Vec<f32>, scoping: ScopingKind) -> (Program, f32) {
+/// The likeliest program that may be called, and its probability among those that the scoping allows.
+fn likeliest_program(mut logits: Vec<f32>, scoping: ScopingKind, allowed: Option<&Allowed>) -> (Program, f32) {
     for (logit, program) in logits.iter_mut().zip(Program::ALL) {
         if !scoping.may_call(program) {
             *logit = f32::NEG_INFINITY;
         }
     }
-    let (idx, probability) = likeliest(&logits);
-    (Program::from_index(idx).unwrap_or(Program::None), probability)
+    let mut among = logits.clone();
+    let programs = allowed.map_or(&[][..], |allowed| &allowed.programs);
+    for (logit, program) in among.iter_mut().zip(Program::ALL) {
+        if !programs.is_empty() && !programs.contains(&program) {
+            *logit = f32::NEG_INFINITY;
+        }
+    }
+    let (idx, _) = likeliest(&among);
+    (Program::from_index(idx).unwrap_or(Program::None), probability(&logits, idx))
 }
 
 /// Log-probabilities of each frame's labels.
@@ -341,8 +360,12 @@ fn label_scores(logits: Tensor<3>) -> Result<Vec<LabelScores>, ReadError> {
 /// The first of the largest logits, and its probability.
 fn likeliest(logits: &[f32]) -> (usize, f32) {
     let best = (0..logits.len()).reduce(|best, idx| if logits[idx] > logits[best] { idx } else { best }).unwrap_or(0);
-    let sum: f32 = logits.iter().map(|logit| (logit - logits[best]).exp()).sum();
-    (best, sum.recip())
+    (best, probability(logits, best))
+}
+
+/// The probability of one of some logits.
+fn probability(logits: &[f32], idx: usize) -> f32 {
+    logits.iter().map(|logit| (logit - logits[idx]).exp()).sum::<f32>().recip()
 }
 
 fn log_probabilities(logits: &LabelScores) -> LabelScores {

@@ -50,6 +50,20 @@ pub struct Query {
     /// The picture of now with the gripper's state, for a policy that sees, which is given it in place of the
     /// observation; none for another.
     pub seen: Arc<Pictures>,
+    /// What the answer may be; anything where nothing is known.
+    pub allowed: Option<Allowed>,
+}
+
+/// What an answer may be, where whoever asks knows what happened next. A policy that weighs its answers gives the
+/// likeliest of these; what it says of its probabilities is of all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Allowed {
+    /// The programs that may be called; all where there is none.
+    pub programs: Vec<Program>,
+    /// The first frame of a callee's part.
+    pub begin: u32,
+    /// Its last frame, one of these that lie in the window, not before `begin`; any where there is none.
+    pub lasts: Vec<u32>,
 }
 
 /// The answer: one step of the running program.

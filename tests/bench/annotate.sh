@@ -7,7 +7,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 source "$here/../foreign/common.sh"
 work=$(work_folder "$1")
 cd "$here/../.."
-environment annotate-venv pyarrow numpy ruptures mujoco mcap mcap-ros2-support
+environment annotate-venv pyarrow numpy ruptures mujoco mcap mcap-ros2-support mcap-protobuf-support
 python="$bin/python $here/annotate.py"
 ntp() { ${NTP:-cargo run --quiet --release --} "$@"; }
 
@@ -99,3 +99,37 @@ for family in stacking sorting cleanup; do
     $python baselines "$work/$family-warped" > "$work/baselines-$family.json"
     cat "$work/baselines-$family.json"
 done
+
+# Made in MuJoCo by an expert that is not ours: its own ways, contacts and paces, recorded in ROS 2 form and taken in. What
+# was called when is known from the other end of the line.
+if [ ! -f "$work/mujoco-acted/rollouts.parquet" ]; then
+    rm -rf "$work/mujoco-acted"
+    ntp act oracle --demonstration "$work/stacking-others/recordings" --episode "$(seq -s, 0 2 47)" --reset \
+        --robot "$bin/python data/robots/mujoco_table.py --record $work/mujoco.mcap" --record "$work/mujoco-acted" \
+        --json > "$work/mujoco-acted.json" 2> "$work/mujoco-acted.txt" || true
+fi
+cat > "$work/mujoco-map.toml" <<'TOML'
+fps = 10
+robot_type = "mujoco"
+task = "build the towers"
+[episodes]
+by = "gap"
+topic = "/tf"
+secs = 0.5
+[observations]
+family = "block_stacking"
+gripper = { topic = "/tf", field = "transforms[child_frame_id=gripper].transform.translation" }
+opening = { topic = "/joint_states", field = "position", joints = ["left", "right"] }
+closed_below_m = 0.06
+objects = { topic = "/tf", field = "transforms[child_frame_id={}].transform.translation" }
+TOML
+rm -rf "$work/mujoco-taken" "$work/mujoco-plain" "$work/mujoco-truth"
+ntp ingest "$work/mujoco.mcap" --map "$work/mujoco-map.toml" --to "$work/mujoco-taken" > "$work/mujoco-taken.txt"
+ntp annotate "$work/mujoco-taken" --model "$stacking" --to "$work/mujoco-plain" --json > "$work/mujoco-plain.json"
+$python transfer "$work"/mujoco-acted/recordings/*.mcap "$work/mujoco-plain" "$work/mujoco-truth"
+rm -rf "$work/mujoco-labelled"
+ntp annotate "$work/mujoco-taken" --model "$stacking" --to "$work/mujoco-labelled" --against "$work/mujoco-truth" \
+    --json > "$work/mujoco-labelled.json"
+$python table mujoco-stacking "$work/mujoco-labelled.json"
+$python baselines "$work/mujoco-truth" > "$work/baselines-mujoco.json"
+cat "$work/baselines-mujoco.json"

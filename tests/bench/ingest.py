@@ -1,8 +1,9 @@
-"""`ntp ingest` beside `forge convert` on one MCAP file: ingest.py WORK_DIR NTP [MEGABYTES]
+"""`ntp ingest` beside `forge convert` on one MCAP file: ingest.py WORK_DIR NTP [MEGABYTES [jpeg | raw]]
 
-ROS 2 messages as a robot records them: two cameras of 640x480 at 30 Hz as JPEG, joint states at 100 Hz, commands at
-30 Hz. Says CPU-seconds (user and system), the greatest memory, and the ratio. Needs forge-robotics, mcap-ros2-support,
-pillow and numpy.
+ROS 2 messages as a robot records them: two cameras of 640x480 at 30 Hz, joint states at 100 Hz, commands at 30 Hz.
+Pictures are JPEG, or raw: forge-robotics 0.2 finds no size in compressed ones and stops. Says CPU-seconds (user and
+system), the greatest memory, and the ratio; of raw pictures stored as PNG, and encoded as H.264. Needs forge-robotics,
+opencv-python-headless, av, mcap-ros2-support, pillow and numpy.
 """
 
 import io
@@ -27,7 +28,15 @@ int32 sec
 uint32 nanosec
 """
 JOINTS = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort" + STAMP
-IMAGE = "std_msgs/Header header\nstring format\nuint8[] data" + STAMP
+IMAGE = {
+    "jpeg": ("CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data" + STAMP, "/image/compressed"),
+    "raw": (
+        "Image",
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n"
+        "uint8[] data" + STAMP,
+        "/image",
+    ),
+}
 NAMES = [f"joint_{at}" for at in range(7)]
 MAP = """
 fps = 30
@@ -41,15 +50,17 @@ name = "action"
 from = [{ topic = "/command", field = "position" }]
 [[feature]]
 name = "observation.images.front"
-from = [{ topic = "/front/image/compressed" }]
+from = [{ topic = "/frontIMAGE" }]
+STORE
 [[feature]]
 name = "observation.images.wrist"
-from = [{ topic = "/wrist/image/compressed" }]
+from = [{ topic = "/wristIMAGE" }]
+STORE
 """
 
 
-def pictures():
-    """Sixty pictures of a moving pattern with grain, about 90 kB each."""
+def pictures(form):
+    """Sixty pictures of a moving pattern with grain, about 90 kB each as JPEG."""
     from PIL import Image
 
     dice, made = np.random.default_rng(0), []
@@ -59,18 +70,25 @@ def pictures():
         pixels = np.clip(base + dice.normal(0, 14, (480, 640, 3)), 0, 255).astype(np.uint8)
         data = io.BytesIO()
         Image.fromarray(pixels).save(data, "JPEG", quality=85)
-        made.append(data.getvalue())
+        made.append(data.getvalue() if form == "jpeg" else pixels.tobytes())
     return made
 
 
-def write(path, megabytes):
+def shown(form, data):
+    if form == "jpeg":
+        return {"format": "jpeg", "data": data}
+    return {"height": 480, "width": 640, "encoding": "rgb8", "is_bigendian": 0, "step": 1920, "data": data}
+
+
+def write(path, megabytes, form):
     from mcap_ros2.writer import Writer
 
-    shown = pictures()
+    made = pictures(form)
+    name, definition, topic = IMAGE[form]
     with open(path, "wb") as file:
         writer = Writer(file)
         joints = writer.register_msgdef("sensor_msgs/msg/JointState", JOINTS)
-        image = writer.register_msgdef("sensor_msgs/msg/CompressedImage", IMAGE)
+        image = writer.register_msgdef(f"sensor_msgs/msg/{name}", definition)
         step, n_bytes = 0, 0
         while n_bytes < megabytes * 10**6:
             now = 10**9 + step * 10**9 // 300
@@ -83,8 +101,8 @@ def write(path, megabytes):
             if step % 10 == 0:
                 put("/command", joints, state)
                 for at, camera in enumerate(["front", "wrist"]):
-                    picture = shown[(step // 10 + 30 * at) % len(shown)]
-                    put(f"/{camera}/image/compressed", image, {"header": header, "format": "jpeg", "data": picture})
+                    picture = made[(step // 10 + 30 * at) % len(made)]
+                    put(f"/{camera}{topic}", image, {"header": header, **shown(form, picture)})
                     n_bytes += len(picture)
             step += 1
         writer.finish()
@@ -109,18 +127,21 @@ def measured(name, command):
 def main():
     work, ntp = pathlib.Path(sys.argv[1]), sys.argv[2]
     megabytes = int(sys.argv[3]) if len(sys.argv) > 3 else 1000
+    form = sys.argv[4] if len(sys.argv) > 4 else "jpeg"
     work.mkdir(parents=True, exist_ok=True)
-    file, chart = work / f"bench-{megabytes}.mcap", work / "map.toml"
+    file, chart = work / f"bench-{form}-{megabytes}.mcap", work / "map.toml"
     if not file.exists():
-        write(file, megabytes)
-    chart.write_text(MAP)
+        write(file, megabytes, form)
     print(f"{file.name}: {file.stat().st_size / 1e6:.0f} MB")
-    for name in ("ours", "theirs"):
-        shutil.rmtree(work / name, ignore_errors=True)
-    ours = measured("ntp ingest", [ntp, "ingest", str(file), "--map", str(chart), "--to", str(work / "ours")])
+    shutil.rmtree(work / "theirs", ignore_errors=True)
     forge = pathlib.Path(sys.executable).parent / "forge"
     theirs = measured("forge convert", [str(forge), "convert", str(file), str(work / "theirs"), "--format", "lerobot-v3"])
-    print(f"forge takes {theirs / ours:.1f} times the CPU-seconds")
+    for store in ["as_is"] if form == "jpeg" else ["as_is", "h264"]:
+        shutil.rmtree(work / "ours", ignore_errors=True)
+        chart.write_text(MAP.replace("IMAGE", IMAGE[form][2]).replace("STORE", f'store = "{store}"'))
+        name = f"ntp ingest, pictures {store}"
+        ours = measured(name, [ntp, "ingest", str(file), "--map", str(chart), "--to", str(work / "ours")])
+        print(f"forge takes {theirs / ours:.1f} times the CPU-seconds")
 
 
 if __name__ == "__main__":

@@ -439,6 +439,7 @@ fn first_query(demonstration: &Episode) -> ntp::rollout::Query {
         program: demonstration.provenance.family.root_program(),
         observation: demonstration.frames[0].observation(),
         seen: Default::default(),
+        allowed: None,
     }
 }
 

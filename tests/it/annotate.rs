@@ -52,16 +52,11 @@ impl Knowing {
         let Some(call) = calls.get(self.made[query.episode]) else { return Decision::end(query) };
         let shown = call.output.filter(|_| call.program.is_composite());
         let scope = match shown {
-            Some(_) if query.depth == 0 => {
-                let first = Self::first_alike(calls, call).frames;
-                // Asked with what is left, it sees no other before it.
-                if query.window.contains(first) { first } else { call.frames }
-            }
+            Some(_) if query.depth == 0 => Self::first_alike(calls, call).frames,
             Some(scope) => scope,
             None => query.window,
         };
-        let is_final = query.depth != 0 || scope.begin == call.frames.begin || call.program == Program::None;
-        self.made[query.episode] += usize::from(is_final);
+        self.made[query.episode] += 1;
         Decision {
             program: call.program,
             scope,

@@ -613,6 +613,7 @@ fn queries() -> Vec<Query> {
             program,
             observation: Observation { slots_m, closed: row[25] > 0.5 },
             seen: Default::default(),
+            allowed: None,
         }
     };
     (0..24).map(|episode| query((episode, programs[episode % 4]))).collect()
