@@ -25,7 +25,8 @@ fn of_scope(prediction: &Prediction, scope: Span, window: Span) -> f32 {
     };
     let start = |frame: u32| of(&prediction.start_probabilities, frame);
     let stop = |frame: u32| of(&prediction.stop_probabilities, frame);
-    let first = (window.begin..scope.begin).fold(scope.begin, |best, at| if start(at) > start(best) { at } else { best });
+    let first =
+        (window.begin..scope.begin).fold(scope.begin, |best, at| if start(at) > start(best) { at } else { best });
     let stops = if first < scope.begin {
         (first + 1..=scope.begin).map(stop).fold(0.0, f32::max)
     } else if scope.len() > 1 {

@@ -5,6 +5,7 @@
 
 use crate::program::Program;
 use crate::rollout::Allowed;
+use crate::scene::SlotIndex;
 use crate::trace::{ObservationRows, Span};
 
 /// The changes of a demonstration's gripper, by the key frame at which each is done.
@@ -48,21 +49,34 @@ impl GripperChanges {
         self.changes.iter().find(|(frame, _)| *frame == at + 1).map(|&(_, primitive)| primitive)
     }
 
-    /// What a program that was given a part may do at a frame. A part that a root gives ends with an empty hand.
-    pub(super) fn allowed(&self, at: u32, part: Span, is_root: bool) -> Option<Allowed> {
+    /// What a program that was given a part may do at a frame, with what is held. A part that a root gives ends with an
+    /// empty hand, and nothing is brought to itself.
+    pub(super) fn allowed(&self, at: u32, part: Span, running: Program, held: Option<SlotIndex>) -> Option<Allowed> {
         if self.is_none() {
             return None;
         }
         let ahead = self.ahead(at, part);
-        if ahead.is_empty() {
-            return Some(Allowed { programs: vec![Program::None], begin: at, lasts: Vec::new() });
-        }
-        let parts = Program::ALL.into_iter().filter(|program| program.is_composite() && !program.is_root());
-        let primitive = (!is_root).then(|| self.next(at).unwrap_or(Program::MoveTo));
-        let releases = ahead.iter().filter(|(_, primitive)| !is_root || *primitive == Program::Release);
-        let lasts = releases.map(|&(frame, _)| frame).collect();
-        Some(Allowed { programs: parts.chain(primitive).collect(), begin: at, lasts })
+        let Some(&(_, first)) = ahead.first() else {
+            let (programs, lasts) = (vec![Program::None], Vec::new());
+            return Some(Allowed { programs, begin: at, lasts, not_argument: None });
+        };
+        let programs = match running.n_slots() {
+            1 => vec![self.next(at).unwrap_or(Program::MoveTo)],
+            0 => with_slots(2),
+            _ => with_slots(1)
+                .into_iter()
+                .filter(|&program| (program == Program::Pick) == (first == Program::Grip))
+                .collect(),
+        };
+        let lasts = ahead.iter().filter(|(_, primitive)| !running.is_root() || *primitive == Program::Release);
+        Some(Allowed { programs, begin: at, lasts: lasts.map(|&(frame, _)| frame).collect(), not_argument: held })
     }
+}
+
+/// Composite programs about so many slots. A root calls those about two, what is moved and where to; these call those
+/// about one of them; and these call primitives.
+fn with_slots(n_slots: usize) -> Vec<Program> {
+    Program::ALL.into_iter().filter(|program| program.is_composite() && program.n_slots() == n_slots).collect()
 }
 
 #[cfg(test)]
@@ -80,27 +94,30 @@ mod tests {
 
     #[test]
     fn a_root_gives_parts_that_end_when_the_hand_is_empty() {
-        let whole = Span { begin: 0, end: 9 };
-        let allowed = changes().allowed(0, whole, true).unwrap();
-        assert_eq!((allowed.begin, &allowed.lasts[..]), (0, &[4, 8][..]));
-        assert!(!allowed.programs.contains(&Program::None) && !allowed.programs.contains(&Program::MoveTo));
-        assert_eq!(changes().allowed(4, whole, true).unwrap().lasts, [8]);
-        assert_eq!(changes().allowed(8, whole, true).unwrap().programs, [Program::None]);
+        let allowed = |at: u32| changes().allowed(at, Span { begin: 0, end: 9 }, Program::ObjectSorting, None).unwrap();
+        assert_eq!((allowed(0).begin, &allowed(0).lasts[..]), (0, &[4, 8][..]));
+        assert_eq!(allowed(0).programs, [Program::PickAndPlace, Program::PickAndDrop]);
+        assert_eq!(allowed(4).lasts, [8]);
+        assert_eq!(allowed(8).programs, [Program::None]);
     }
 
     #[test]
     fn a_callee_moves_until_the_gripper_changes_and_ends_with_its_part() {
         let part = Span { begin: 0, end: 5 };
-        let allowed = |at: u32| changes().allowed(at, part, false).unwrap();
-        assert_eq!(allowed(0).lasts, [2, 4]);
-        let primitives = |at: u32| {
-            let programs = allowed(at).programs.into_iter();
-            programs.filter(|program| program.is_primitive()).collect::<Vec<_>>()
-        };
-        assert_eq!(primitives(0), [Program::MoveTo]);
-        assert_eq!(primitives(1), [Program::Grip]);
-        assert_eq!(primitives(3), [Program::Release]);
-        assert_eq!(allowed(4).programs, [Program::None]);
+        let allowed = |at: u32, running: Program| changes().allowed(at, part, running, None).unwrap();
+        assert_eq!(allowed(0, Program::PickAndDrop).lasts, [2, 4]);
+        assert_eq!(allowed(0, Program::PickAndDrop).programs, [Program::Pick]);
+        assert_eq!(allowed(2, Program::PickAndDrop).programs, [Program::Place, Program::Drop]);
+        let calls = |at: u32| allowed(at, Program::Pick).programs;
+        assert_eq!([calls(0), calls(1), calls(3)], [[Program::MoveTo], [Program::Grip], [Program::Release]]);
+        assert_eq!(allowed(4, Program::PickAndDrop).programs, [Program::None]);
+    }
+
+    #[test]
+    fn what_is_held_is_not_where_it_is_brought_to() {
+        let held = Some(SlotIndex(3));
+        let allowed = changes().allowed(2, Span { begin: 2, end: 5 }, Program::Place, held).unwrap();
+        assert_eq!((&allowed.programs[..], allowed.not_argument), (&[Program::MoveTo][..], held));
     }
 
     #[test]
@@ -108,6 +125,6 @@ mod tests {
         let still = vec![Observation { slots_m: vec![[0.0; 3]], closed: false }; 3];
         let changes = GripperChanges::of(&ObservationRows::of(1, &still));
         assert!(changes.is_none());
-        assert_eq!(changes.allowed(0, Span { begin: 0, end: 3 }, true), None);
+        assert_eq!(changes.allowed(0, Span { begin: 0, end: 3 }, Program::ObjectSorting, None), None);
     }
 }

@@ -32,27 +32,39 @@ const SHIFT_M: f32 = 0.12;
 const PAUSE_PACE: f32 = 0.5;
 /// The least height from which a gripper goes down to a thing, in metres.
 const WAY_DOWN_M: f32 = 0.015;
-/// What stays within this of where it is in the end rests, in metres.
-const REST_M: f32 = 0.002;
+/// What stays within this of where it is in the end rests, in metres. Less than a gripper rises from what it let go.
+const REST_M: f32 = 0.001;
 /// A rest at the end that is no longer than this belongs to the last primitive, which waits for it, in seconds.
 const REST_SECS: f64 = 0.35;
 /// A change of the gripper that lasts shorter is a flicker, in frames.
 const FLICKER_FRAMES: usize = 2;
 
 /// A key frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyFrame {
     /// Which frame of the episode.
     pub frame: u32,
+    /// The frame that shows where things are then: of several things of one kind the next is shown once the gripper is
+    /// open, when it may be on its way up already.
+    pub shown: u32,
+    /// From where the gripper is in `frame` to where it is in `shown`, in metres.
+    pub shift_m: [f32; 3],
     /// Whether the gripper is closed then. A frame that was taken a moment before it closes stands for the moment.
     pub closed: bool,
+}
+
+impl KeyFrame {
+    /// A frame as it is.
+    pub fn at(frame: usize, closed: bool) -> Self {
+        Self { frame: frame as u32, shown: frame as u32, shift_m: [0.0; 3], closed }
+    }
 }
 
 /// The key frames of an episode, in order: the first frame, then the ends of primitives.
 pub fn key_frames(episode: &ObservedEpisode) -> Vec<KeyFrame> {
     let path = gripper_path(episode);
     let closed: Vec<bool> = episode.observations.iter().map(|row| !row.is_open()).collect();
-    let mut keys = vec![KeyFrame { frame: 0, closed: closed.first().copied().unwrap_or(false) }];
+    let mut keys = vec![KeyFrame::at(0, closed.first().copied().unwrap_or(false))];
     let changes = changes(&closed);
     for (number, &change) in changes.iter().enumerate() {
         let begin = keys.last().map_or(0, |key| key.frame as usize);
@@ -60,26 +72,37 @@ pub fn key_frames(episode: &ObservedEpisode) -> Vec<KeyFrame> {
         let place = resting(&path, begin, change);
         let leaves = leaves(&path, place, until).max(place);
         let end = if until == path.len() { leaves.min(rests(episode).max(place)) } else { leaves };
-        let hover = hover(&path, begin, place);
-        if hover > begin && hover < end {
-            keys.push(KeyFrame { frame: hover as u32, closed: closed[change - 1] });
+        if let Some(hover) = hover(&path, begin, place) {
+            keys.push(KeyFrame::at(hover, closed[change - 1]));
         }
         if end > begin {
-            keys.push(KeyFrame { frame: end as u32, closed: closed[change] });
+            let shown = if closed[change] { end } else { end.max(change) };
+            let shift_m = [0, 1, 2].map(|axis| path[shown][axis] - path[end][axis]);
+            keys.push(KeyFrame { shown: shown as u32, shift_m, ..KeyFrame::at(end, closed[change]) });
         }
     }
+    keys.extend(cut_release(&path, &closed, &keys));
     keys
 }
 
-/// The frame at which the gripper is where it changes: at it or right before, wherever it moves less.
+/// The key frames of a release that the end of the episode cuts: it closes on nothing any more, and has gone down.
+fn cut_release(path: &[[f32; 3]], closed: &[bool], keys: &[KeyFrame]) -> Vec<KeyFrame> {
+    let (last, begin) = (path.len().saturating_sub(1), keys.last().map_or(0, |key| key.frame as usize));
+    if !closed.last().copied().unwrap_or(false) || keys.len() == 1 || begin + 1 >= last {
+        return Vec::new();
+    }
+    match hover(path, begin, last) {
+        Some(hover) if path[hover][2] - path[last][2] >= WAY_DOWN_M => {
+            vec![KeyFrame::at(hover, true), KeyFrame::at(last, false)]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The frame at which the gripper is where it changes: at it or, where it is on its way up by then, right before.
 fn resting(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
-    let pace = |frame: usize| {
-        let to = path.get(frame + 1).map_or(0.0, |&next| distance_m(path[frame], next));
-        let from = frame.checked_sub(1).map_or(0.0, |before| distance_m(path[before], path[frame]));
-        to.min(from)
-    };
     let is_before = change > begin + 1 && path[change - 1][2] < path[change][2] - STILL_M / 2.0;
-    if is_before && pace(change - 1) <= pace(change) { change - 1 } else { change }
+    if is_before { change - 1 } else { change }
 }
 
 /// Where the gripper is in each frame. Where it is not told, it is the opposite of how most objects move past it, from
@@ -144,30 +167,34 @@ fn rests(episode: &ObservedEpisode) -> usize {
     let Some(end) = rows.get(last) else { return last };
     let is_there = |frame: &usize| {
         let row = rows.get(*frame);
-        row.is_some_and(|row| row.positions.iter().zip(end.positions).all(|(&now, &then)| distance_m(now, then) < REST_M))
+        row.is_some_and(|row| {
+            row.positions.iter().zip(end.positions).all(|(&now, &then)| distance_m(now, then) < REST_M)
+        })
     };
     let rests = last - (0..last).rev().take_while(is_there).count();
     let secs = |frame: usize| episode.times_secs.get(frame).copied().unwrap_or(0.0);
     if secs(last) - secs(rests) > REST_SECS { rests } else { last }
 }
 
-/// The frame behind `begin` at which the gripper hovers, before it goes down to where it changes.
-fn hover(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
-    let Some(&place) = path.get(change) else { return change };
-    let is_hover = |&frame: &usize| path[frame][2] - place[2] >= WAY_DOWN_M && beside_m(path[frame], place) < SHIFT_M;
+/// The frame between two at which the gripper hovers, before it goes down to where it changes; nothing where there is
+/// none between them.
+fn hover(path: &[[f32; 3]], begin: usize, change: usize) -> Option<usize> {
+    let place = path.get(change)?;
+    let is_hover = |&frame: &usize| path[frame][2] - place[2] >= WAY_DOWN_M && beside_m(path[frame], *place) < SHIFT_M;
     let height_mm = |frame: usize| (path[frame][2] / STILL_M).round() as i32;
     // The lowest, as it may pause above everything on its way too; of these the first, as it may shift before it goes
     // down.
     let lowest =
         pauses(path, begin, change).into_iter().filter(is_hover).min_by_key(|&frame| (height_mm(frame), frame));
-    lowest.unwrap_or_else(|| way_down(path, begin, change)).clamp((begin + 1).min(change), change)
+    let found = lowest.unwrap_or_else(|| way_down(path, begin, change));
+    (begin + 1 < change).then(|| found.clamp(begin + 1, change - 1))
 }
 
 /// The last frame from which the gripper only goes down to where it changes.
 fn way_down(path: &[[f32; 3]], begin: usize, change: usize) -> usize {
     let place = path[change];
     let goes_down =
-        |frame: usize| beside_m(path[frame], place) < BESIDE_M && path[frame][2] >= path[frame + 1][2] - STILL_M / 4.0;
+        |frame: usize| beside_m(path[frame], place) < BESIDE_M && path[frame][2] >= path[frame + 1][2] - STILL_M / 2.0;
     let top = (begin..change).rev().take_while(|&frame| goes_down(frame)).last().unwrap_or(change);
     let is_up = |&frame: &usize| path[frame][2] > path[top][2] - STILL_M;
     (top..change).take_while(is_up).last().unwrap_or(top)
@@ -189,7 +216,7 @@ fn pauses(path: &[[f32; 3]], begin: usize, end: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{changes, key_frames, pauses};
+    use super::{KeyFrame, changes, cut_release, hover, key_frames, pauses, resting};
     use crate::dataset::ObservedEpisode;
     use crate::trace::{Observation, ObservationRows};
 
@@ -258,6 +285,30 @@ mod tests {
         assert_eq!(rest(3), Some(n_frames + 2), "it waits for what it set down");
         // The gripper opens one frame after the last motion: nothing moves from there on.
         assert_eq!(rest(20), Some(n_frames));
+    }
+
+    #[test]
+    fn a_gripper_that_is_on_its_way_up_closed_where_it_was_lowest() {
+        let path = [[0.0, 0.0, 0.2], [0.0, 0.0, 0.1], [0.0, 0.0, 0.045], [0.0, 0.0, 0.12]];
+        assert_eq!([resting(&path, 0, 3), resting(&path, 0, 2)], [2, 2]);
+    }
+
+    #[test]
+    fn a_way_down_without_a_pause_begins_at_its_top() {
+        let mut path = vec![[0.0, 0.0, 0.05], [0.0, 0.0, 0.2], [0.2, 0.0, 0.2]];
+        path.extend([[0.2, 0.0, 0.15], [0.2, 0.0, 0.1], [0.2, 0.0, 0.045]]);
+        assert_eq!(hover(&path, 0, 5), Some(2));
+        assert_eq!(hover(&path, 4, 5), None, "there is no frame between");
+    }
+
+    #[test]
+    fn a_release_that_the_end_cuts_ends_with_the_episode() {
+        let path = [[0.0, 0.0, 0.05], [0.0, 0.0, 0.2], [0.2, 0.0, 0.2], [0.2, 0.0, 0.12], [0.2, 0.0, 0.1]];
+        let keys = [KeyFrame::at(0, false), KeyFrame::at(0, true)];
+        let cut = cut_release(&path, &[false, true, true, true, true], &keys);
+        assert_eq!(cut, [KeyFrame::at(2, true), KeyFrame::at(4, false)]);
+        assert_eq!(cut_release(&path[..3], &[false, true, true], &keys), [], "it is still up");
+        assert_eq!(cut_release(&path, &[false, true, true, true, false], &keys), [], "it is open");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::annotate::gripper_changes::GripperChanges;
 use crate::model::Pictures;
 use crate::program::Program;
 use crate::rollout::{Decision, Policy, PolicyError, Query, Specification};
+use crate::scene::SlotIndex;
 use crate::trace::{CallId, Observation, ObservationRows, ProgramCall, Span};
 
 /// A demonstration taken apart. Spans count its key frames.
@@ -125,6 +126,7 @@ impl Walk {
     /// What to ask the policy now; nothing when all programs have ended.
     fn query(&self, episode: usize) -> Option<Query> {
         let top = self.running.last()?;
+        let running = self.calls[top.call].program;
         Some(Query {
             episode,
             decision: self.n_decisions,
@@ -132,11 +134,18 @@ impl Walk {
             step: top.n_steps,
             specification: Arc::clone(&self.specification),
             window: top.scope,
-            program: self.calls[top.call].program,
+            program: running,
             observation: observation(&self.states, self.at),
             seen: Arc::clone(&self.seen),
-            allowed: self.changes.allowed(self.at, top.scope, top.call == 0),
+            allowed: self.changes.allowed(self.at, top.scope, running, self.held()),
         })
+    }
+
+    /// What the gripper was moved to before it gripped; nothing while it is empty.
+    fn held(&self) -> Option<SlotIndex> {
+        let last = self.calls.iter().rposition(|call| matches!(call.program, Program::Grip | Program::Release))?;
+        let moved = self.calls[..last].iter().rev().find_map(|call| call.argument);
+        moved.filter(|_| self.calls[last].program == Program::Grip)
     }
 
     /// Takes a decision down, made of what `window` shows.
@@ -176,12 +185,14 @@ impl Walk {
         let change = self.changes.next(self.at);
         let part = self.running.last().map_or(window, |top| top.scope);
         decision.end_of_program = change.is_some() || !self.changes.has_ahead(self.at + 1, part);
-        let confidence = confidence(&decision, window);
         match change {
-            Some(changed) if changed != decision.program => {
-                (Decision { program: changed, argument: None, ..decision }, confidence.min(UNSEEN))
+            // What can be seen is sure.
+            None => {
+                let argument_probability = decision.argument_probability;
+                (decision, argument_probability)
             }
-            _ => (decision, confidence),
+            Some(changed) if changed == decision.program => (decision, 1.0),
+            Some(changed) => (Decision { program: changed, argument: None, ..decision }, UNSEEN),
         }
     }
 
@@ -349,6 +360,16 @@ impl Walk {
         Parsed { calls: self.calls, confidences: self.confidences, doubts: self.doubts }
     }
 
+    /// How far a slot is beside the gripper at a key frame or, if it is nearer then, at the next: where it closes or opens.
+    fn distance_m(&self, frame: u32, slot: SlotIndex) -> f32 {
+        let beside_m = |frame: u32| {
+            let state = self.states.get(frame as usize)?;
+            state.positions.get(usize::from(slot.0)).map(|[x, y, _]| x.hypot(*y))
+        };
+        let nearest = [frame, frame + 1].into_iter().filter_map(beside_m).reduce(f32::min);
+        nearest.unwrap_or(0.0)
+    }
+
     /// What primitives leave behind them can be seen.
     fn check_effects(&mut self) {
         for call in self.calls.iter().filter(|call| call.program.is_primitive()) {
@@ -362,8 +383,7 @@ impl Walk {
             if is_wrong {
                 self.doubts.push(Doubt::Gripper { call: id, program, closed });
             }
-            let aim = call.argument.and_then(|slot| state.positions.get(usize::from(slot.0)));
-            let distance_m = aim.map_or(0.0, |[x, y, _]| x.hypot(*y));
+            let distance_m = call.argument.map_or(0.0, |slot| self.distance_m(call.frames.last(), slot));
             if distance_m > REACH_M {
                 self.doubts.push(Doubt::Away { call: id, distance_m });
             }
@@ -371,10 +391,11 @@ impl Walk {
     }
 }
 
-/// How sure a call is at most that the policy did not make.
+/// How sure a call is that the policy did not make.
 const UNSEEN: f32 = 0.4;
-/// A gripper that hovers is not farther beside the middle of a thing than this, in metres: half of a small container.
-const REACH_M: f32 = 0.06;
+/// A gripper is not farther beside the middle of a thing than this, in metres: half of a small container, or where a bowl
+/// is held at its rim.
+const REACH_M: f32 = 0.075;
 
 fn observation(states: &ObservationRows, frame: u32) -> Observation {
     states.get(frame as usize).map_or_else(

@@ -97,7 +97,7 @@ impl<'a> Trees<'a> {
             return key_frames(episode);
         }
         let rows = episode.observations.iter().enumerate();
-        rows.map(|(frame, row)| KeyFrame { frame: frame as u32, closed: !row.is_open() }).collect()
+        rows.map(|(frame, row)| KeyFrame::at(frame, !row.is_open())).collect()
     }
 
     /// The surest of what models say of an episode; where another says something else, that is a doubt.
@@ -170,8 +170,9 @@ fn sureness(parsed: &Parsed) -> f32 {
 /// The observations of key frames.
 fn rows_of(all: &ObservationRows, keys: &[KeyFrame]) -> ObservationRows {
     let observation = |key: &KeyFrame| {
-        let row = all.get(key.frame as usize)?;
-        Some(Observation { slots_m: row.positions.to_vec(), closed: key.closed })
+        let row = all.get(key.shown as usize)?;
+        let shifted = |at: &[f32; 3]| [0, 1, 2].map(|axis| at[axis] + key.shift_m[axis]);
+        Some(Observation { slots_m: row.positions.iter().map(shifted).collect(), closed: key.closed })
     };
     let observations: Vec<Observation> = keys.iter().filter_map(observation).collect();
     ObservationRows::of(all.n_slots(), &observations)

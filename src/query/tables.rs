@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use polars::prelude::{
     Column, DataFrame, DataType, IntoLazy as _, LazyFrame, NamedFrom as _, PlRefPath, PolarsError, ScanArgsParquet,
     SchemaRef, Series, UnionArgs, col, concat, lit,
 };
 use serde::Serialize;
+use tempfile::TempPath;
 
 use crate::dataset;
 use crate::query::{Answer, QueryError};
@@ -27,6 +29,22 @@ struct Source {
     model: Option<String>,
     /// What was read of a file that is no Parquet.
     rows: Option<DataFrame>,
+    /// The file as Polars can read it, where it cannot read the file itself.
+    plain: Option<Arc<TempPath>>,
+}
+
+impl Source {
+    fn new(path: PathBuf) -> Self {
+        Self { path, model: None, rows: None, plain: None }
+    }
+
+    /// The file that is read.
+    fn file(&self) -> &Path {
+        match &self.plain {
+            Some(plain) => plain,
+            None => &self.path,
+        }
+    }
 }
 
 /// What a table holds.
@@ -49,10 +67,15 @@ impl Tables {
     pub fn add_dataset(&mut self, root: &Path) -> Result<(), QueryError> {
         for (name, files) in dataset::table_files(root)? {
             match files {
-                dataset::TableFiles::Parquet(files) => files.into_iter().for_each(|path| self.add(name, path, None)),
+                dataset::TableFiles::Parquet(files) => {
+                    for path in files {
+                        let plain = table::without_extensions(&path)?.map(Arc::new);
+                        self.0.entry(name).or_default().push(Source { plain, ..Source::new(path) });
+                    }
+                }
                 dataset::TableFiles::Columns(path, columns) => {
                     let rows = Some(frame_of(&path, columns)?);
-                    self.0.entry(name).or_default().push(Source { path, model: None, rows });
+                    self.0.entry(name).or_default().push(Source { rows, ..Source::new(path) });
                 }
             }
         }
@@ -80,7 +103,7 @@ impl Tables {
     }
 
     fn add(&mut self, name: &'static str, path: PathBuf, model: Option<String>) {
-        self.0.entry(name).or_default().push(Source { path, model, rows: None });
+        self.0.entry(name).or_default().push(Source { model, ..Source::new(path) });
     }
 
     /// The tables that there are.
@@ -209,11 +232,11 @@ fn union(sources: &[Source]) -> Result<LazyFrame, QueryError> {
     }
     let unreadable = |source| refused(sources, source);
     if sources.iter().all(|source| source.model.is_none()) {
-        return scan(sources.iter().map(|source| source.path.as_path())).map_err(unreadable);
+        return scan(sources.iter().map(Source::file)).map_err(unreadable);
     }
     let with_model = |source: &Source| {
         let model = source.model.clone().unwrap_or_default();
-        Ok(scan([source.path.as_path()])?.with_columns([lit(model).alias("model")]))
+        Ok(scan([source.file()])?.with_columns([lit(model).alias("model")]))
     };
     let frames = sources.iter().map(with_model).collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
     let rows = concat(&frames, UnionArgs::default()).and_then(LazyFrame::collect).map_err(unreadable)?;

@@ -257,7 +257,11 @@ impl<N: Network> LearnedPolicy<N> {
         let (mut arguments, mut first_probability) = (Arguments::default(), 1.0);
         let n_arguments = self.network.scoping().n_arguments_of(callee);
         if n_arguments > 0 {
-            let logits = all_finite(self.network.argument(reading, query.program.into(), core), "the argument")?;
+            let mut logits = all_finite(self.network.argument(reading, query.program.into(), core), "the argument")?;
+            let refused = query.allowed.as_ref().and_then(|allowed| allowed.not_argument);
+            if let Some(logit) = refused.and_then(|slot| logits.get_mut(usize::from(slot.0))) {
+                *logit = f32::MIN;
+            }
             let rows = logits.chunks_exact(query.specification.n_slots.max(1)).take(n_arguments);
             for (number, (slot, row)) in arguments.iter_mut().zip(rows).enumerate() {
                 let (likeliest, probability) = likeliest(row);

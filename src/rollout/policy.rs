@@ -64,6 +64,8 @@ pub struct Allowed {
     pub begin: u32,
     /// Its last frame, one of these that lie in the window, not before `begin`; any where there is none.
     pub lasts: Vec<u32>,
+    /// What the argument cannot be.
+    pub not_argument: Option<SlotIndex>,
 }
 
 /// The answer: one step of the running program.
