@@ -83,6 +83,7 @@ fn with_slots(n_slots: usize) -> Vec<Program> {
 mod tests {
     use super::GripperChanges;
     use crate::program::Program;
+    use crate::scene::SlotIndex;
     use crate::trace::{Observation, ObservationRows, Span};
 
     /// Two things are picked up and put down, with a move before each.

@@ -8,7 +8,7 @@ use ntp::model::{
     States, Variant, WEIGHTS_FILE, Windows, check_purpose, inspect, span_score, weights_to_bytes, with_network,
 };
 use ntp::program::Program;
-use ntp::rollout::{Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
+use ntp::rollout::{Allowed, Decision, LearnedPolicy, Policy as _, Query, Specification, load_policy};
 use ntp::scene::SlotIndex;
 use ntp::seed::Seed;
 use ntp::task::{Family, Split};
@@ -653,6 +653,29 @@ fn decisions_are_lawful_whatever_the_weights() {
         for variant in Variant::every().filter(|variant| !variant.sees()) {
             with_network(&config(variant), Seed(seed), &device(), Lawful).unwrap();
         }
+    }
+}
+
+#[test]
+fn a_policy_answers_with_what_is_allowed_whatever_the_weights() {
+    let query = queries().swap_remove(0);
+    let n_frames = query.specification.whole().end;
+    let ask = |seed: u64, programs: Vec<Program>, not_argument: Option<SlotIndex>| {
+        let allowed = Allowed { programs, begin: 1, lasts: vec![2, n_frames - 1, n_frames + 7], not_argument };
+        let window = query.specification.whole();
+        let query = Query { window, allowed: Some(allowed), ..query.clone() };
+        let mut policy = LearnedPolicy::new("ntp", object_centric(seed), Decoder::Mss);
+        policy.decide(&[query]).unwrap().swap_remove(0)
+    };
+    for seed in 0..10 {
+        let decision = ask(seed, vec![Program::Pick, Program::Place], None);
+        assert!([Program::Pick, Program::Place].contains(&decision.program));
+        assert_eq!(decision.scope.begin, 1);
+        assert!([2, n_frames - 1].contains(&decision.scope.last()), "{:?}", decision.scope);
+        let chosen = ask(seed, vec![Program::MoveTo], None).argument;
+        let other = ask(seed, vec![Program::MoveTo], chosen).argument;
+        assert!(chosen.is_some() && other.is_some() && other != chosen);
+        assert_eq!(ask(seed, vec![Program::None], None).program, Program::None);
     }
 }
 

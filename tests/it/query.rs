@@ -5,9 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, Float32Array, Int8Array, Int16Array, Int32Array, RecordBatch, UInt8Array, UInt16Array, UInt32Array,
+    Array as _, ArrayRef, Float32Array, Int8Array, Int16Array, Int32Array, ListArray, RecordBatch, UInt8Array,
+    UInt16Array, UInt32Array,
 };
-use arrow::datatypes::DataType;
+use arrow::datatypes::{DataType, Field, Float32Type, Schema};
 use ntp::dataset::ConvertConfig;
 use ntp::query::{QueryError, Tables, query};
 use parquet::arrow::ArrowWriter;
@@ -315,6 +316,35 @@ fn a_column_of_a_type_that_is_not_read_is_named_and_other_tables_are_answered() 
 }
 
 /// The statements of the page of examples.
+/// LeRobot declares arrays of several dimensions so.
+#[test]
+fn a_column_with_an_extension_type_of_arrow_is_read_as_the_lists_that_it_is() {
+    let (folder, _) = small_dataset();
+    let path = folder.path().join("data/chunk-000/file-000.parquet");
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap().build().unwrap();
+    let batches: Vec<RecordBatch> = reader.map(Result::unwrap).collect();
+    let told = [("ARROW:extension:name", "datasets.features.features.Array2DExtensionType")];
+    let told = told.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let extended: Vec<RecordBatch> = (batches.iter())
+        .map(|batch| {
+            let lists = (0..batch.num_rows()).map(|row| Some(vec![Some(row as f32), Some(0.5)]));
+            let lists: ArrayRef = Arc::new(ListArray::from_iter_primitive::<Float32Type, _, _>(lists));
+            let field = Field::new("grid", lists.data_type().clone(), true).with_metadata(told.clone().into());
+            let fields = batch.schema().fields().iter().cloned().chain([Arc::new(field)]).collect::<Vec<_>>();
+            let columns = batch.columns().iter().cloned().chain([lists]).collect();
+            RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap()
+        })
+        .collect();
+    let mut writer = ArrowWriter::try_new(File::create(&path).unwrap(), extended[0].schema(), None).unwrap();
+    extended.iter().for_each(|batch| writer.write(batch).unwrap());
+    writer.close().unwrap();
+    let mut tables = Tables::default();
+    tables.add_dataset(folder.path()).unwrap();
+    let n_frames = batches.iter().map(RecordBatch::num_rows).sum::<usize>();
+    let found = rows(&tables, "SELECT COUNT(*) AS n, SUM(grid[2]) AS s FROM frames");
+    assert_eq!(found, [json!({ "n": n_frames, "s": n_frames as f64 / 2.0 })]);
+}
+
 fn examples() -> Vec<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/queries.md");
     let page = std::fs::read_to_string(page).unwrap();
