@@ -360,13 +360,15 @@ impl Walk {
         Parsed { calls: self.calls, confidences: self.confidences, doubts: self.doubts }
     }
 
-    /// How far a slot is beside the gripper at a key frame or, if it is nearer then, at the next: where it closes or opens.
+    /// How far a slot is beside the gripper at a key frame or, if it is nearer then, at the next, where that closes: of
+    /// fast hands the frame of hovering is not known well.
     fn distance_m(&self, frame: u32, slot: SlotIndex) -> f32 {
         let beside_m = |frame: u32| {
             let state = self.states.get(frame as usize)?;
             state.positions.get(usize::from(slot.0)).map(|[x, y, _]| x.hypot(*y))
         };
-        let nearest = [frame, frame + 1].into_iter().filter_map(beside_m).reduce(f32::min);
+        let grips = (self.changes.next(frame) == Some(Program::Grip)).then_some(frame + 1);
+        let nearest = [Some(frame), grips].into_iter().flatten().filter_map(beside_m).reduce(f32::min);
         nearest.unwrap_or(0.0)
     }
 
