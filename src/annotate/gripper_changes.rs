@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_root_gives_parts_that_end_when_the_hand_is_empty() {
-        let allowed = |at: u32| changes().allowed(at, Span { begin: 0, end: 9 }, Program::ObjectSorting, None).unwrap();
+        let allowed = |at: u32| changes().allowed(at, Span { begin: 0, end: 9 }, Program::ANY_ROOT, None).unwrap();
         assert_eq!((allowed(0).begin, &allowed(0).lasts[..]), (0, &[4, 8][..]));
         assert_eq!(allowed(0).programs, [Program::PickAndPlace, Program::PickAndDrop]);
         assert_eq!(allowed(4).lasts, [8]);
@@ -126,6 +126,6 @@ mod tests {
         let still = vec![Observation { slots_m: vec![[0.0; 3]], closed: false }; 3];
         let changes = GripperChanges::of(&ObservationRows::of(1, &still));
         assert!(changes.is_none());
-        assert_eq!(changes.allowed(0, Span { begin: 0, end: 3 }, Program::ObjectSorting, None), None);
+        assert_eq!(changes.allowed(0, Span { begin: 0, end: 3 }, Program::ANY_ROOT, None), None);
     }
 }
