@@ -367,7 +367,7 @@ fn an_episode_simulated_again_is_the_same_in_every_frame() {
         let path = smoke::whole().join(part);
         let (code, stdout, stderr) = run(&["replay", path.to_string_lossy().as_ref(), "--episode", "1", "--verify"]);
         assert_eq!(code, 0, "{part}: {stdout} {stderr}");
-        assert!(stdout.contains("are the same"), "{stdout}");
+        assert!(stdout.contains("episode 1 simulated again: the same in"), "{stdout}");
     }
     let recorded = smoke::whole().join("recordings");
     let (code, stdout, _) = run(&["replay", &recorded.to_string_lossy(), "--episode", "0,2", "--verify", "--json"]);
@@ -476,9 +476,13 @@ fn settings_of_networks_and_noise_that_cannot_be_are_refused_with_what_is_allowe
     check_refused(start, "models[0].training", "start_from is set for variant ntp_vid_detector; allowed: variants");
     let maps = |text: &str| {
         let detector = "[models.training.detector]\nheat_maps = true\n\n[rollout]";
-        text.replace("[rollout]", detector)
+        text.replace("variant = \"ntp\"", "variant = \"ntp_vid_detector\"").replace("[rollout]", detector)
     };
-    check_refused(maps, "models[0].training", "detector.heat_maps is on for variant ntp; allowed: on with ntp_vid");
+    check_refused(
+        maps,
+        "models[0].training",
+        "detector.heat_maps is on for variant ntp_vid_detector; allowed: on with ntp_vid",
+    );
     let allowed = "noise.frame_m is -0.01; allowed: from 0 to 0.1";
     check_refused(training("noise = { frame_m = -0.01 }"), "models[0].training", allowed);
     let suite = |more: &'static str| move |text: &str| text.replace("episodes = 4", &format!("episodes = 4\n{more}"));

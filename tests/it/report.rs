@@ -711,7 +711,7 @@ fn the_page_shows_every_part() {
         "paper 86.3 %<b>+3.7 pts</b>",
         "ended early: 1 of 8 rollouts, 12.5 %",
         "<code>ntp</code> 1 of 1 failure; 1 recovered",
-        "decision 17: scope, 1 rollouts",
+        "decision 17: scope, 1 rollout</title>",
         "ntp, 100 tasks, training seed 0: 0.1267 in the end",
         "<dt>training tasks</dt><dd>100</dd>",
         "rollouts.parquet</code>",

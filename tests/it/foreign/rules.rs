@@ -260,7 +260,7 @@ fn what_lerobot_would_refuse_or_misread_is_a_finding() {
             "count is [3.0], but there are 15 frames",
             Box::new(|mini| mini.stats["action"]["count"] = json!([3])),
         ),
-        ("stats.value", "max has 1 values", Box::new(|mini| mini.stats["action"]["max"] = json!([1]))),
+        ("stats.value", "max has 1 value,", Box::new(|mini| mini.stats["action"]["max"] = json!([1]))),
     ];
     for (code, words, change) in cases {
         let folder = written(change);
