@@ -61,11 +61,7 @@ pub(super) fn locate(shape: &Shape, points: &[Vec3], eye: &Vec3, last: Option<&P
     let start = start(shape, points, eye);
     let is_near = |last: &&Pose| (last.translation.vector - start).norm() <= SAME_PLACE_M;
     if let Some(last) = last.filter(is_near) {
-        // What faces the camera squarely shows its sides and not where they end: then only the points' middle tells that it
-        // was moved along them.
-        let moved = Pose::from_parts(Vec3::new(start.x, start.y, last.translation.z).into(), last.rotation);
-        let [found, moved] = [*last, moved].map(|from| fit(shape, points, &from));
-        let found = if moved.cost < found.cost { moved } else { found };
+        let found = fit(shape, points, last);
         if found.is_the_same() {
             return Some(alike(shape, found.in_world, last));
         }
