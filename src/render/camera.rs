@@ -101,6 +101,10 @@ impl Camera {
 pub fn looking_at(eye: &Vec3, target: &Vec3) -> Pose {
     let forward = (target - eye).try_normalize(1e-6).unwrap_or(-Vec3::z());
     let right = forward.cross(&Vec3::z()).try_normalize(1e-4).unwrap_or(Vec3::x());
-    let axes = nalgebra::Matrix3::from_columns(&[right, forward.cross(&right), forward]);
-    Pose::from_parts((*eye).into(), Rotation::from_matrix(&axes))
+    let axes = [right, forward.cross(&right), forward];
+    let turned = Rotation::from_matrix(&nalgebra::Matrix3::from_columns(&axes));
+    // That goes towards the axes step by step, and stays where it begins when they are half a turn away. It is kept
+    // where it arrives: places of cameras in recordings of before are its, to the last bit.
+    let arrives = (turned * Vec3::z() - forward).norm() + (turned * Vec3::x() - right).norm() < 1e-3;
+    Pose::from_parts((*eye).into(), if arrives { turned } else { Rotation::from_basis_unchecked(&axes) })
 }

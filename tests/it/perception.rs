@@ -46,8 +46,8 @@ fn at(errors: &[f32], share: f32) -> f32 {
 }
 
 #[test]
-fn an_exact_camera_sees_blocks_and_what_is_sorted_within_two_millimetres() {
-    for family in [Family::BlockStacking, Family::ObjectSorting] {
+fn an_exact_camera_sees_things_of_every_family_within_two_millimetres() {
+    for family in [Family::BlockStacking, Family::ObjectSorting, Family::TableCleanup] {
         let [level, height] = errors_mm(family, &exact(), 5);
         let told =
             format!("{}: level {} {}, height {}", family.name(), at(&level, 0.5), at(&level, 1.0), at(&height, 1.0));

@@ -32,6 +32,26 @@ fn from_above() -> Camera {
 }
 
 #[test]
+fn a_camera_looks_at_its_target_from_every_side() {
+    let target = Vec3::new(-0.27, 0.06, 0.03);
+    let away = [-1.0, 0.0, 1.0].map(|x| [-1.0, 0.0, 1.0].map(|y| [x, y]));
+    for [x, y] in away.concat() {
+        for z in [-1.0, 0.0, 1.0] {
+            let from_target = Vec3::new(x, y, z) * 0.95;
+            if from_target.norm() == 0.0 {
+                continue;
+            }
+            let pose = looking_at(&(target + from_target), &target);
+            let forward = pose * Vec3::z();
+            assert!((forward + from_target.normalize()).norm() < 1e-4, "{x} {y} {z}: {forward}");
+            // The picture's y points down.
+            let down = pose * Vec3::y();
+            assert!(down.z <= 1e-4 && (pose * Vec3::x()).z.abs() < 1e-4, "{x} {y} {z}: {down}");
+        }
+    }
+}
+
+#[test]
 fn a_face_at_a_known_depth_has_this_depth_segment_and_extent() {
     let (scene, state) = cube_scene();
     let mut renderer = Renderer::new(Look::plain());
