@@ -27,7 +27,7 @@ const SET_DOWN_M: f32 = 0.001;
 const BELOW_M: f32 = 0.005;
 /// What a body rests on is below more than its edge, in metres.
 const EDGE_M: f32 = 0.004;
-/// Where fingers that find nothing close, above the table, in metres.
+/// No lower do fingers close, above the table, in metres.
 const ON_TABLE_M: f32 = 0.002;
 
 /// A camera, and how what is held lies in the gripper.
@@ -136,7 +136,8 @@ impl Simulation {
         let mut refused = Cause::Collided;
         for grasp in self.grasps(body) {
             let over = Tool { yaw_rad: grasp.yaw_rad, ..self.gripper.tool.over(grasp.position) };
-            let down = self.follow(over, Air::Unknown).and_then(|()| self.sink(grasp.position.z, 0.0));
+            let z = grasp.position.z.max(TIP_M + ON_TABLE_M);
+            let down = self.follow(over, Air::Unknown).and_then(|()| self.sink(z, 0.0));
             match down {
                 Ok(short_m) if short_m <= BLOCKED_M => return self.take_what_is_there(body),
                 Ok(_) => refused = Cause::Collided,
