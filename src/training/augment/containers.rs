@@ -66,19 +66,32 @@ impl Merge {
     /// Changes what is seen. Positions are relative to the gripper: one that goes along moves everything that stays.
     ///
     /// What is taken over is put `aside` besides, in x and y and in metres for each slot, since the first of a category
-    /// that falls into a container in use does not fall into its middle. What is at the gripper stays there.
+    /// that falls into a container in use does not fall into its middle. What is at the gripper takes the gripper along,
+    /// so that it is held and let go where it will lie.
     pub(super) fn apply_to_row(&self, positions: &mut [[f32; 3]], aside: &[[f32; 2]]) {
         let before = positions.to_vec();
-        let gripper = self.shift(&before, [0.0; 2]);
+        let put_aside = |shift: [f32; 3], slot: usize| {
+            let [x, y] = aside.get(slot).filter(|_| shift != [0.0; 3]).copied().unwrap_or_default();
+            [shift[0] + x, shift[1] + y, shift[2]]
+        };
+        let at_gripper = self.at_gripper(&before);
+        let over_container = self.shift(&before, [0.0; 2]);
+        let gripper = at_gripper.map_or(over_container, |slot| put_aside(over_container, slot));
         for (slot, position) in positions.iter_mut().enumerate() {
-            let goes = !self.containers.contains(&slot);
-            let own = if goes { self.shift(&before, [position[0], position[1]]) } else { [0.0; 3] };
-            let is_at_gripper = position[0].hypot(position[1]) < AT_GRIPPER_M;
-            let is_taken_over = own != [0.0; 3] && !is_at_gripper;
+            let own = match slot {
+                container if self.containers.contains(&container) => [0.0; 3],
+                slot if is_at_gripper(&before[slot]) => gripper,
+                slot => put_aside(self.shift(&before, [before[slot][0], before[slot][1]]), slot),
+            };
             (0..3).for_each(|axis| position[axis] += own[axis] - gripper[axis]);
-            let aside = aside.get(slot).filter(|_| is_taken_over);
-            aside.into_iter().for_each(|aside| (0..2).for_each(|axis| position[axis] += aside[axis]));
         }
+    }
+
+    /// What is held, or has just been let go.
+    fn at_gripper(&self, positions: &[[f32; 3]]) -> Option<usize> {
+        let things = (0..positions.len()).filter(|slot| !self.containers.contains(slot));
+        let near = things.filter(|&slot| is_at_gripper(&positions[slot]));
+        near.min_by(|&a, &b| positions[a][2].abs().total_cmp(&positions[b][2].abs()))
     }
 
     /// How far what lies at a place goes: from the container that it lies in or above to the one that takes over.
@@ -88,6 +101,10 @@ impl Merge {
         let other = self.taken_over_by[slot - self.containers.start];
         std::array::from_fn(|axis| positions[other][axis] - positions[slot][axis])
     }
+}
+
+fn is_at_gripper(position: &[f32; 3]) -> bool {
+    position[0].hypot(position[1]) < AT_GRIPPER_M
 }
 
 #[cfg(test)]
@@ -118,13 +135,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_taken_over_is_put_aside_but_for_what_is_at_the_gripper() {
+    fn what_is_taken_over_is_put_aside_and_takes_the_gripper_along() {
         let merge = Merge { containers: 2..4, half_m: 0.105, taken_over_by: vec![3, 3] };
-        let aside = [[0.04, -0.03]; 4];
+        let aside = [[0.04, -0.03], [0.02, 0.01], [0.0; 2], [0.0; 2]];
         // Both categories lie in the first container; the gripper has just let go of the second.
         let mut seen = [[0.03, 0.02, -0.28], [0.0, 0.0, 0.0], [0.0, 0.0, -0.3], [0.26, 0.0, -0.3]];
         merge.apply_to_row(&mut seen, &aside);
-        assert_eq!(rounded(&seen), [7, -1, -28, 0, 0, 0, -26, 0, -30, 0, 0, -30]);
+        assert_eq!(rounded(&seen), [5, -2, -28, 0, 0, 0, -28, -1, -30, -2, -1, -30]);
         // What lies in the container that takes over stays.
         let mut stays = [[0.53, 0.02, -0.28], [0.7, 0.1, -0.28], [0.25, 0.0, -0.3], [0.5, 0.0, -0.3]];
         let before = rounded(&stays);
