@@ -42,8 +42,8 @@ impl Views {
         if let Some(merge) = merge.filter(|_| merged < config.merge_containers) {
             let seed = Seed(u64::from(merged.to_bits()) << 32 | u64::from(jittered.to_bits()));
             let Aside { demonstrated, seen } = Aside::draw(config.merge_aside_m, self.n_slots, seed);
-            self.window.iter_mut().for_each(|row| merge.apply_to_row(row.positions, &demonstrated));
-            self.state.iter_mut().for_each(|row| merge.apply_to_row(row.positions, &seen));
+            self.window.iter_mut().for_each(|row| merge.apply_to_row(row, &demonstrated));
+            self.state.iter_mut().for_each(|row| merge.apply_to_row(row, &seen));
             merge.apply_to_slots(&mut self.example);
         }
         if scattered < config.scatter_bystanders {
