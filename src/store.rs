@@ -6,20 +6,20 @@
 //! the place of anything, and of several processes that create a name at once one succeeds. Nothing here knows what the
 //! files are.
 
+mod address;
 #[cfg(feature = "cloud")]
 mod bucket;
 mod error;
 mod folder;
-mod place;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+pub use address::{AddressError, BucketUrl, StoreAddress};
 #[cfg(feature = "cloud")]
 pub use bucket::Bucket;
 pub use error::StoreError;
 pub use folder::{Folder, files_below};
-pub use place::{BucketUrl, NoPlace, Place};
 
 /// A place that holds files. They are named relative to it, with `/`.
 pub trait Store: fmt::Debug + Send + Sync {

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cluster::Engine;
 use crate::pipeline::Stage;
-use crate::store::Place;
+use crate::store::StoreAddress;
 
 /// `ntp items`.
 #[derive(Debug, Args)]
@@ -23,7 +23,7 @@ pub struct ItemsArgs {
     #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The run is in a store, s3://BUCKET/RUN or a folder.
     #[arg(long, value_name = "URL", conflicts_with = "out")]
-    pub store: Option<Place>,
+    pub store: Option<StoreAddress>,
     /// Only those that are not done.
     #[arg(long)]
     pub left: bool,
@@ -57,7 +57,7 @@ pub struct SubmitArgs {
     /// The run is in a store, s3://BUCKET/RUN or a folder; every node then has its own copy of what it needs, and the
     /// run directory holds scripts and logs alone.
     #[arg(long, value_name = "URL")]
-    pub store: Option<Place>,
+    pub store: Option<StoreAddress>,
     /// An argument for every sbatch, e.g. --sbatch-arg=--partition=cpu; may be given several times.
     #[arg(long, value_name = "ARG", allow_hyphen_values = true)]
     pub sbatch_arg: Vec<String>,

@@ -8,7 +8,7 @@ use crate::dataset::LabelsForm;
 use crate::dataset::edit::{Ending, EpisodeRange};
 use crate::dataset::export::LabelForm;
 use crate::publish::{Date, License, Release};
-use crate::store::Place;
+use crate::store::StoreAddress;
 use crate::task::Family;
 
 /// `ntp ingest`.
@@ -42,7 +42,7 @@ pub struct PublishArgs {
     #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The folder to publish it into, or s3://BUCKET[/PREFIX]. After an interruption, the same command carries on.
     #[arg(long, value_name = "DIR|URL")]
-    pub to: Place,
+    pub to: StoreAddress,
     /// The licence, by its name at the Hugging Face hub or SPDX, such as cc-by-4.0. There is no default.
     #[arg(long, value_name = "ID")]
     pub license: License,
@@ -72,7 +72,7 @@ pub struct VerifyArgs {
     #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The published folder, or s3://BUCKET[/PREFIX].
     #[arg(value_name = "DIR|URL")]
-    pub copy: Place,
+    pub copy: StoreAddress,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::model::ComputeDevice;
 use crate::pipeline::{ItemRanges, Stage};
-use crate::store::Place;
+use crate::store::StoreAddress;
 
 /// How stages run.
 #[derive(Clone, Debug, Args)]
@@ -36,7 +36,7 @@ pub struct StageArgs {
     #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The run is in a store, s3://BUCKET/RUN or a folder; --out is this machine's copy of what is needed here.
     #[arg(long, value_name = "URL")]
-    pub store: Option<Place>,
+    pub store: Option<StoreAddress>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -150,7 +150,7 @@ pub struct TasksArgs {
     #[expect(clippy::doc_markdown, reason = "a help text")]
     /// The run is in a store, s3://BUCKET/RUN or a folder; --out is this machine's copy of what is needed here.
     #[arg(long, value_name = "URL", conflicts_with = "import")]
-    pub store: Option<Place>,
+    pub store: Option<StoreAddress>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

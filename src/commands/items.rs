@@ -8,7 +8,7 @@ use crate::cli::ItemsArgs;
 use crate::commands::stages::run_directory;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineFile, RunDir, Stage};
-use crate::store::Place;
+use crate::store::StoreAddress;
 use crate::words::counted;
 
 pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
@@ -45,7 +45,7 @@ pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
 }
 
 /// What a store tells of a run, in a folder of its own.
-fn records(store: &Place, copy: &Path) -> anyhow::Result<RunDir> {
+fn records(store: &StoreAddress, copy: &Path) -> anyhow::Result<RunDir> {
     let run = RunDir::new(copy).with_files_elsewhere();
     pipeline::bring_records(store.open()?.as_ref(), &run)?;
     Ok(run)

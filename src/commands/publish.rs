@@ -9,7 +9,7 @@ use crate::commands::kind::Kind;
 use crate::commands::{CommandOutcome, UsageError, output};
 use crate::dataset::summarize;
 use crate::publish::{Publication, publish};
-use crate::store::Place;
+use crate::store::StoreAddress;
 use crate::words::{counted, shell_path};
 
 pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<CommandOutcome> {
@@ -32,7 +32,7 @@ pub(super) fn run(args: &PublishArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<
             summary.copied,
             summary.kept
         ))?;
-        if let Place::Folder(folder) = &args.to {
+        if let StoreAddress::Folder(folder) = &args.to {
             let script = shell_path(&folder.join("upload.sh"));
             output::note(&format!("to the Hugging Face hub: sh {script} OWNER/NAME"));
         }

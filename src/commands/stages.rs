@@ -11,7 +11,7 @@ use crate::cli::{Part, ScopeArgs, StageArgs};
 use crate::commands::{CommandOutcome, output};
 use crate::model::ComputeDevice;
 use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Stale, Status};
-use crate::store::Place;
+use crate::store::StoreAddress;
 use crate::words::{counted, shell_path};
 
 /// Runs the stages `from..=to` and prints a line for each unit.
@@ -78,7 +78,7 @@ fn run_stages(
     stop: &Arc<AtomicBool>,
 ) -> anyhow::Result<(RunDir, Vec<StageReport>)> {
     let file = PipelineFile::load(&args.pipeline)?;
-    let store = args.store.as_ref().map(Place::open).transpose()?;
+    let store = args.store.as_ref().map(StoreAddress::open).transpose()?;
     // What a dry run looks at in a store is no copy to be kept.
     let looked_at = store.as_ref().filter(|_| args.dry_run).map(|_| tempfile::tempdir()).transpose()?;
     let out = looked_at.as_ref().map(tempfile::TempDir::path).or(args.out.as_deref());

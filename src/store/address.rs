@@ -8,7 +8,7 @@ use crate::store::{Folder, Store, StoreError};
 
 /// A place as it is written on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum StoreAddress {
     /// A folder.
     Folder(PathBuf),
     /// A place in a bucket of an S3-compatible store.
@@ -27,15 +27,15 @@ pub struct BucketUrl {
 /// A text is no place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{found:?} is no place for files; allowed: a folder, or s3://BUCKET[/PREFIX] without . and .. in it")]
-pub struct NoPlace {
+pub struct AddressError {
     found: String,
 }
 
-impl FromStr for Place {
-    type Err = NoPlace;
+impl FromStr for StoreAddress {
+    type Err = AddressError;
 
-    fn from_str(text: &str) -> Result<Self, NoPlace> {
-        let wrong = || NoPlace { found: text.to_owned() };
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let wrong = || AddressError { found: text.to_owned() };
         let Some((scheme, rest)) = text.split_once("://") else {
             return if text.is_empty() { Err(wrong()) } else { Ok(Self::Folder(text.into())) };
         };
@@ -57,7 +57,7 @@ impl fmt::Display for BucketUrl {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for StoreAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Folder(path) => write!(f, "{}", path.display()),
@@ -66,7 +66,7 @@ impl fmt::Display for Place {
     }
 }
 
-impl Place {
+impl StoreAddress {
     /// Opens it. A bucket's address and keys are taken from the environment, as programs for such stores do.
     ///
     /// # Errors
@@ -86,18 +86,19 @@ impl Place {
 
 #[cfg(test)]
 mod tests {
-    use super::{BucketUrl, Place};
+    use super::{BucketUrl, StoreAddress};
 
     #[test]
     fn a_place_is_a_folder_or_a_bucket_with_a_prefix() {
-        let bucket =
-            |bucket: &str, prefix: &str| Place::Bucket(BucketUrl { bucket: bucket.into(), prefix: prefix.into() });
-        assert_eq!("data/published".parse(), Ok(Place::Folder("data/published".into())));
+        let bucket = |bucket: &str, prefix: &str| {
+            StoreAddress::Bucket(BucketUrl { bucket: bucket.into(), prefix: prefix.into() })
+        };
+        assert_eq!("data/published".parse(), Ok(StoreAddress::Folder("data/published".into())));
         assert_eq!("s3://robots".parse(), Ok(bucket("robots", "")));
         assert_eq!("s3://robots/a/b/".parse(), Ok(bucket("robots", "a/b")));
         assert_eq!(bucket("robots", "a/b").to_string(), "s3://robots/a/b");
         for wrong in ["", "s3://", "s3:///a", "s3://a b", "s3://robots/a/../b", "s3://robots//a", "gs://robots"] {
-            assert!(wrong.parse::<Place>().is_err(), "{wrong:?}");
+            assert!(wrong.parse::<StoreAddress>().is_err(), "{wrong:?}");
         }
     }
 }
