@@ -10,7 +10,7 @@ use crate::artifact::{IoError, create_dir, read_json, sha256_file, write, write_
 use crate::cluster::copies::Copies;
 use crate::cluster::script;
 use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineError, PipelineFile, RunDir, Stage};
-use crate::store::{NoPlace, Place, StoreError};
+use crate::store::{AddressError, StoreAddress, StoreError};
 
 /// The folder in a run directory.
 pub(super) const FOLDER: &str = "submit";
@@ -68,7 +68,7 @@ pub struct SubmitOptions {
     /// Arguments for every `sbatch`.
     pub sbatch_args: Vec<String>,
     /// Where the run is, if it is in a store; the run directory then holds what is handed over alone.
-    pub store: Option<Place>,
+    pub store: Option<StoreAddress>,
     /// Hand over another pipeline or program than before.
     pub force: bool,
 }
@@ -101,7 +101,7 @@ pub enum ClusterError {
     },
     /// What is kept of a submission names no store.
     #[error(transparent)]
-    NoStore(#[from] NoPlace),
+    NoStore(#[from] AddressError),
     /// The script cannot be written.
     #[error("the template of a script: {0}")]
     Template(#[from] minijinja::Error),
@@ -258,20 +258,20 @@ fn check_store(file: &PipelineFile, options: &SubmitOptions) -> Result<(), Pipel
 }
 
 /// A place as every folder would name it.
-fn whole_name(place: &Place) -> Result<String, IoError> {
+fn whole_name(place: &StoreAddress) -> Result<String, IoError> {
     match place {
-        Place::Folder(path) => {
+        StoreAddress::Folder(path) => {
             let whole = std::path::absolute(path).map_err(IoError::system("find", path))?;
             Ok(whole.to_string_lossy().into_owned())
         }
-        Place::Bucket(url) => Ok(url.to_string()),
+        StoreAddress::Bucket(url) => Ok(url.to_string()),
     }
 }
 
 /// Where it is told how far a run is: in its directory, or in a copy of what a store tells.
 pub(super) fn run_dir(run: &Path, store: Option<&str>, copy: &Path) -> Result<RunDir, ClusterError> {
     let Some(store) = store else { return Ok(RunDir::new(run)) };
-    let place: Place = store.parse()?;
+    let place: StoreAddress = store.parse()?;
     let records = RunDir::new(copy).with_files_elsewhere();
     pipeline::bring_records(place.open()?.as_ref(), &records)?;
     Ok(records)
