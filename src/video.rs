@@ -12,6 +12,7 @@
 //! No panic on any input.
 
 mod clip;
+mod container;
 mod error;
 mod film;
 mod gif;

@@ -1,14 +1,14 @@
 //! MP4 with one track of H.264 at a constant frame rate: written packet by packet, read sample by sample.
 
 use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use muxide::api::{Muxer, MuxerBuilder, VideoCodec};
-use re_mp4::{Mp4, StsdBoxContent};
+use re_mp4::StsdBoxContent;
 
 use crate::artifact::{AtomicFile, IoError};
-use crate::table::catch_panic;
+use crate::video::container::read_container;
 use crate::video::{VideoError, is_key_frame};
 
 /// A file on its way. Its pictures are kept in memory until it is finished.
@@ -109,16 +109,7 @@ impl Mp4Reader {
     ///
     /// When the file has not exactly one track of H.264.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
-        let len = file.metadata().map_err(IoError::system("read", path))?.len();
-        let reader = BufReader::new(file.try_clone().map_err(IoError::system("open", path))?);
-        // The library indexes by numbers that it reads; a damaged file must not end the program.
-        let parsed = catch_panic(|| Mp4::read(reader, len));
-        let mp4 = match parsed {
-            Ok(Ok(mp4)) => mp4,
-            Ok(Err(error)) => return Err(container(path, &error)),
-            Err(words) => return Err(container(path, &format!("the video's tables contradict each other: {words}"))),
-        };
+        let (mp4, file, len) = read_container(path)?;
         let mut tracks = mp4.tracks().values();
         let (Some(track), None) = (tracks.next(), tracks.next()) else {
             return Err(container(path, &format!("{} tracks, expected one of video", mp4.tracks().len())));

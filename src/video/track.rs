@@ -8,11 +8,11 @@ use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use re_mp4::{Mp4, StsdBoxContent, TrakBox};
+use re_mp4::{StsdBoxContent, TrakBox};
 
 use crate::artifact::IoError;
-use crate::table::catch_panic;
 use crate::video::VideoError;
+use crate::video::container::read_container;
 
 /// Boxes whose tables are read are no larger than this: the list of a video of a week.
 const MAX_BOX_BYTES: u64 = 1 << 30;
@@ -65,15 +65,7 @@ impl VideoTrackFile {
             path: path.to_owned(),
             message: message.to_string(),
         };
-        let file = File::open(path).map_err(IoError::system("open", path))?;
-        let len = file.metadata().map_err(IoError::system("read", path))?.len();
-        let reader = BufReader::new(file.try_clone().map_err(IoError::system("open", path))?);
-        // The library indexes by numbers that it reads; a damaged file must not end the program.
-        let mp4 = match catch_panic(|| Mp4::read(reader, len)) {
-            Ok(Ok(mp4)) => mp4,
-            Ok(Err(error)) => return Err(wrong(&error)),
-            Err(words) => return Err(wrong(&format!("the video's tables contradict each other: {words}"))),
-        };
+        let (mp4, file, len) = read_container(path)?;
         let is_video = |trak: &&TrakBox| trak.mdia.hdlr.handler_type.value == *b"vide";
         let mut traks = mp4.moov.traks.iter().filter(is_video);
         let (Some(trak), None) = (traks.next(), traks.next()) else {

@@ -1,6 +1,7 @@
 //! Datasets of others, as they are: taken in, checked, asked, shown, edited, published.
 
 mod edits;
+mod fuzz;
 mod labels;
 mod mini;
 mod rules;

@@ -1,5 +1,6 @@
 //! Recordings of robots: rows, episodes and pictures are those of the messages, and every message is accounted for.
 
+mod fuzz;
 mod messages;
 mod recover;
 
