@@ -362,3 +362,28 @@ fn sql_asks_frames_episodes_and_tasks_of_both_formats() {
     assert_eq!(errors, []);
     assert_eq!(summarize(&old).unwrap().lerobot_version, "v2.1");
 }
+
+#[test]
+fn statistics_of_episodes_of_older_datasets_are_found_in_any_order_and_what_is_wrong_with_one_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("old");
+    Mini::new().write_v21(&root);
+    let path = root.join("meta/episodes_stats.jsonl");
+    let whole = std::fs::read_to_string(&path).unwrap();
+    let lines: Vec<&str> = whole.lines().collect();
+    let found = |text: &str| -> Vec<String> {
+        std::fs::write(&path, text).unwrap();
+        let findings = validate(&root).findings.into_iter().filter(|of| of.severity == Severity::Error);
+        findings.map(|of| format!("{} {}: {}", of.code, of.place, of.message)).collect()
+    };
+    assert_eq!(found(&format!("{}\n\n{}\n{}\n", lines[2], lines[0], lines[1])), [""; 0]);
+    assert_eq!(found(&lines[..2].join("\n")), ["stats.value row 2: there is no line of episode 2"]);
+    assert_eq!(
+        found(&whole.replace("\"count\":[5]", "\"count\":[7]")),
+        ["stats.value episode 1: index: count is [7.0], but there are 5 frames"]
+    );
+    let damaged = found(&whole.replacen("\"stats\"", "stats", 1));
+    assert!(damaged.len() == 1 && damaged[0].starts_with("stats.value row 0: no JSON"), "{damaged:?}");
+    let twice = found(&format!("{}\n{whole}", lines[1]));
+    assert_eq!(twice, ["stats.value row 2: episode 1 stands twice"]);
+}

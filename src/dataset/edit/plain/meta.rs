@@ -1,7 +1,5 @@
 //! The rows of `meta/episodes`: carried over with all their columns, but for what counts where an episode lies.
 
-use std::fs::File;
-use std::io::{BufRead as _, BufReader, Lines};
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, RecordBatch};
@@ -10,19 +8,15 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use serde_json::{Value, json};
 
-use crate::artifact::IoError;
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::edit::plain::json::array_of;
 use crate::dataset::edit::plain::schema::{cast_to, fitted, plain_type};
 use crate::dataset::files::layout;
-use crate::dataset::files::stated::parse;
 use crate::dataset::pictures::video_columns;
-use crate::dataset::plain::{DeclaredKind, PlainEpisode, PlainInfo, PlainSource, RowCursor};
+use crate::dataset::plain::{DeclaredKind, EpisodeStatistics, PlainEpisode, PlainInfo, PlainSource, RowCursor};
 use crate::table::BatchReader;
 
-/// Statistics of the episodes of older datasets, a line each.
-const STATS_LINES: &str = "meta/episodes_stats.jsonl";
 /// Statistics that older datasets have of an episode.
 const LINE_STATISTICS: [&str; 5] = ["min", "max", "mean", "std", "count"];
 /// Columns of whole numbers that every row has.
@@ -40,20 +34,15 @@ const NUMBERS: [&str; 8] = [
 /// The rows of a source's episodes.
 pub(super) enum MetaSource {
     Tables(RowCursor),
-    Lines(Option<Lines<BufReader<File>>>, usize),
+    Lines(Option<EpisodeStatistics>),
 }
 
 impl MetaSource {
-    pub(super) fn open(source: &PlainSource) -> Result<Self, IoError> {
-        if !source.info.version.is_by_episode() {
-            return Ok(Self::Tables(RowCursor::of_batches(256)));
+    pub(super) fn open(source: &PlainSource) -> Result<Self, EditError> {
+        if source.info.version.is_by_episode() {
+            return Ok(Self::Lines(EpisodeStatistics::open(&source.info)?));
         }
-        let path = source.info.root().join(STATS_LINES);
-        if !path.is_file() {
-            return Ok(Self::Lines(None, 0));
-        }
-        let file = File::open(&path).map_err(IoError::system("open", &path))?;
-        Ok(Self::Lines(Some(BufReader::new(file).lines()), 0))
+        Ok(Self::Tables(RowCursor::of_batches(256)))
     }
 
     /// The row of an episode, in the columns of a schema. Episodes are asked for in their order.
@@ -75,33 +64,10 @@ impl MetaSource {
                 let missing = || DatasetError::Count { path: path.clone(), problem: "a row is missing".to_owned() };
                 Ok(found.ok_or_else(missing)?)
             }
-            Self::Lines(lines, next) => {
-                let statistics = match lines {
-                    Some(lines) => line(source, lines, next, position)?,
-                    None => Value::Null,
-                };
+            Self::Lines(lines) => {
+                let statistics = lines.as_mut().map_or(Ok(Value::Null), |lines| lines.of(episode.index))?;
                 row_of_line(episode, &statistics, schema).map_err(EditError::rows(path))
             }
-        }
-    }
-}
-
-/// The line of an episode; those before it are passed over.
-fn line(
-    source: &PlainSource,
-    lines: &mut Lines<BufReader<File>>,
-    next: &mut usize,
-    position: usize,
-) -> Result<Value, EditError> {
-    let path = source.info.root().join(STATS_LINES);
-    let wrong = |problem: String| DatasetError::Row { path: path.clone(), row: position as u64, problem };
-    loop {
-        let line = lines.next().ok_or_else(|| wrong("there is no such row".to_owned()))?;
-        let line = line.map_err(IoError::system("read", &path))?;
-        *next += 1;
-        if *next == position + 1 {
-            let value: Value = parse(&line).map_err(|error| wrong(format!("no JSON: {error}")))?;
-            return Ok(value["stats"].clone());
         }
     }
 }
@@ -166,7 +132,7 @@ fn with_numbers(kind: &DataType, is_count: bool) -> DataType {
 
 /// Statistics of older datasets, as columns.
 fn line_fields(info: &PlainInfo) -> Vec<Field> {
-    if !info.root().join(STATS_LINES).is_file() {
+    if !EpisodeStatistics::are_there(info) {
         return Vec::new();
     }
     let depth = |kind: DeclaredKind, shape: &[usize]| match kind {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::artifact::read_json;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
-use crate::dataset::plain::{Declared, DeclaredKind, PlainSource, PlainVersion, REQUIRED};
+use crate::dataset::plain::{Declared, DeclaredKind, EpisodeStatistics, PlainSource, PlainVersion, REQUIRED};
 use crate::dataset::validate::plain::ranges::Range;
 use crate::words::counted;
 
@@ -18,9 +18,10 @@ const IN_ORDER: [&str; 7] = ["min", "q01", "q10", "q50", "q90", "q99", "max"];
 
 pub(super) fn check(source: &PlainSource, ranges: &BTreeMap<String, Range>, n_rows: u64, validation: &mut Validation) {
     let path = source.info.root().join(layout::STATS);
+    // The later ones of the older datasets have them by episode.
+    let by_episode = source.info.version == PlainVersion::V2_1 && check_by_episode(source, validation);
     if !path.exists() {
-        // The later ones of the older datasets have them by episode.
-        if source.info.version != PlainVersion::V2_1 {
+        if !by_episode {
             let message = "it is missing: LeRobot trains with it".to_owned();
             validation.warn("stats.missing", &path, String::new(), message);
         }
@@ -48,6 +49,37 @@ pub(super) fn check(source: &PlainSource, ranges: &BTreeMap<String, Range>, n_ro
             validation.error(code, &path, feature.name.clone(), problem);
         }
     }
+}
+
+/// Each episode's statistics; whether there are any.
+fn check_by_episode(source: &PlainSource, validation: &mut Validation) -> bool {
+    let mut statistics = match EpisodeStatistics::open(&source.info) {
+        Ok(Some(statistics)) => statistics,
+        Ok(None) => return false,
+        Err(error) => {
+            validation.failed("stats.value", &error);
+            return true;
+        }
+    };
+    for episode in &source.episodes {
+        let stated = match statistics.of(episode.index) {
+            Ok(stated) => stated,
+            Err(error) => {
+                validation.failed("stats.value", &error);
+                continue;
+            }
+        };
+        let numeric = source.info.features.iter().filter(|feature| matches!(feature.kind, DeclaredKind::Numbers(_)));
+        let found = numeric.filter(|feature| stated[&feature.name].is_object()).find_map(|feature| {
+            value_problem(&stated[&feature.name], feature, episode.length)
+                .map(|problem| format!("{}: {problem}", feature.name))
+        });
+        if let Some(problem) = found {
+            let place = format!("episode {}", episode.index);
+            validation.error("stats.value", statistics.path(), place, problem);
+        }
+    }
+    true
 }
 
 /// Whether a feature counts rows or texts, which nobody normalises.
