@@ -9,7 +9,6 @@ work=$(work_folder "$1")
 cd "$here/../.."
 environment annotate-venv pyarrow numpy ruptures mujoco mcap mcap-ros2-support mcap-protobuf-support
 python="$bin/python $here/annotate.py"
-ntp() { ${NTP:-cargo run --quiet --release --} "$@"; }
 
 # A model of each family, unless it is there.
 train() { # NAME FAMILY TRAIN TRIALS STEPS FURTHER…

@@ -19,3 +19,7 @@ work_folder() {
     mkdir -p "$1"
     (cd "$1" && pwd)
 }
+
+# The program: that of $NTP, or that of this checkout.
+program=(${NTP:-cargo run --quiet --release --})
+ntp() { "${program[@]}" "$@"; }

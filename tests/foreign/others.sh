@@ -10,7 +10,6 @@ cd "$here/../.."
 environment lerobot-venv "lerobot[dataset,sarm]==0.6.1" "torch<2.8" lerobot-doctor==0.2.0 pyarrow accelerate
 older="$work/lerobot-0.4.4"
 [ -d "$older" ] || "$bin/pip" install --quiet --no-deps --target "$older" lerobot==0.4.4
-ntp() { if [ -n "${NTP:-}" ]; then "$NTP" "$@"; else cargo run --quiet --release -- "$@"; fi; }
 export HF_HUB_OFFLINE=1
 
 [ -d "$work/0.6.1" ] || "$bin/python" "$here/others_write.py" "$work/0.6.1" > "$work/written-0.6.1.txt" 2>&1

@@ -8,7 +8,6 @@ run=$(cd "$1" && pwd)
 work=$(work_folder "$2")
 cd "$here/../.."
 environment foreign-venv mcap mcap-protobuf-support pyarrow pandas polars duckdb mlcroissant==1.1.1 datasets rerun-sdk==0.36.3
-ntp() { cargo run --quiet --release -- "$@"; }
 
 for recording in "$run"/recordings/*.mcap; do
     "$bin/python" "$here/mcap_reads.py" "$recording"
