@@ -11,7 +11,7 @@ use ntp::query::{Tables, query};
 use parquet::basic::{Compression, GzipLevel};
 use serde_json::{Value, json};
 
-use crate::foreign::mini::{doubles, lists};
+use crate::foreign::mini::{CAMERA, doubles, lists};
 use crate::foreign::{Mini, one, whole};
 
 /// A change of a dataset before it is written.
@@ -386,4 +386,21 @@ fn statistics_of_episodes_of_older_datasets_are_found_in_any_order_and_what_is_w
     assert!(damaged.len() == 1 && damaged[0].starts_with("stats.value row 0: no JSON"), "{damaged:?}");
     let twice = found(&format!("{}\n{whole}", lines[1]));
     assert_eq!(twice, ["stats.value row 2: episode 1 stands twice"]);
+}
+
+#[test]
+fn a_video_that_begins_with_no_key_frame_is_a_finding() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut mini = Mini::new();
+    mini.camera().write(folder.path());
+    mini.write_video(folder.path(), true);
+    let path = folder.path().join(format!("videos/{CAMERA}/chunk-000/file-000.mp4"));
+    let mut bytes = std::fs::read(&path).unwrap();
+    // The list of key frames: its name, version and flags, how many, and the number of the first.
+    let list = bytes.windows(4).position(|name| name == b"stss").unwrap();
+    assert_eq!(bytes[list + 12..list + 16], [0, 0, 0, 1]);
+    bytes[list + 15] = 2;
+    std::fs::write(&path, bytes).unwrap();
+    let found = found(folder.path());
+    assert!(found.iter().any(|of| of.starts_with("pictures.decode") && of.contains("no key frame")), "{found:#?}");
 }

@@ -69,6 +69,10 @@ fn check_file(
         }
     };
     check_format(video, path, &track, validation);
+    if track.samples.first().is_some_and(|first| !first.is_key) {
+        let message = "its first picture is no key frame, so it cannot be decoded from its beginning".to_owned();
+        validation.error("pictures.decode", path, String::new(), message);
+    }
     let mut until = 0.0;
     for (episode, span) in episodes {
         let place = || format!("episode {}, {}", episode.index, video.name);
