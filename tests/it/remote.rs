@@ -3,7 +3,7 @@
 mod fuzz;
 mod wires;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
@@ -443,11 +443,17 @@ fn a_robot_does_not_move_for_what_cannot_be_recorded() {
 
 /// Episodes of the recordings of a folder, file by file.
 fn recorded_in(folder: &Path) -> Vec<Vec<Episode>> {
+    let open = |path: &PathBuf| ShardReader::open(path).unwrap().collect::<Result<_, _>>().unwrap();
+    recordings_in(folder).iter().map(open).collect()
+}
+
+/// The whole recordings of `folder`, by name; a recording that is being written has another ending.
+fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     files.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
     files.sort();
-    files.iter().map(|path| ShardReader::open(path).unwrap().collect::<Result<_, _>>().unwrap()).collect()
+    files
 }
 
 #[cfg(unix)]
@@ -465,9 +471,8 @@ fn trials_that_have_ended_outlive_a_kill() {
         .spawn()
         .unwrap();
     // A trial is in the folder as soon as it has ended.
-    let n_files = || std::fs::read_dir(acted.join("recordings")).map_or(0, Iterator::count);
     for _ in 0..1200 {
-        if n_files() >= 3 {
+        if recordings_in(&acted.join("recordings")).len() >= 3 {
             break;
         }
         std::thread::sleep(Duration::from_millis(50));
