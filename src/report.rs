@@ -30,6 +30,7 @@ mod paper;
 mod robot_table;
 mod rollouts;
 mod section;
+mod suite_names;
 mod summary;
 
 pub use actor::{Actor, ModelParts};

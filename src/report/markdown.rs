@@ -9,6 +9,7 @@ use crate::report::detections::DetectionError;
 use crate::report::robot_table::{PaperRobot, RobotRow, Share};
 use crate::report::section::annotations::{self, LevelRow};
 use crate::report::section::models::{self, ModelRow};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::{Aggregate, FirstError, Report};
 
 /// A column: its name, and whether numbers stand in it.
@@ -32,19 +33,21 @@ const COLUMNS: [Column<'static>; 12] = [
 /// The whole text.
 pub(super) fn render(report: &Report) -> String {
     let mut text = format!("**{}**: {}.\n", report.title, made_by(report));
-    glance::glances(report).iter().for_each(|table| text.push_str(&format!("\n{table}")));
+    let names = &SuiteNames::of(&report.aggregates);
+    glance::glances(report, names).iter().for_each(|table| text.push_str(&format!("\n{table}")));
     let mut put = |columns: &[Column<'_>], rows: Vec<Vec<String>>| {
         if !rows.is_empty() {
             text.push('\n');
             text.push_str(&table(columns, rows));
         }
     };
-    put(&COLUMNS, report.aggregates.iter().map(row).collect());
-    put(&ROBOT_COLUMNS, report.robot_table.iter().map(robot).collect());
-    put(&DETECTION_COLUMNS, report.detections.iter().map(detection).collect());
+    put(&COLUMNS, report.aggregates.iter().map(|of| row(of, names)).collect());
+    put(&ROBOT_COLUMNS, report.robot_table.iter().map(|row| robot(row, names)).collect());
+    put(&DETECTION_COLUMNS, report.detections.iter().map(|error| detection(error, names)).collect());
     put(&ANNOTATION_COLUMNS, annotations::rows(&report.annotations).into_iter().map(annotation).collect());
     put(&CLAIM_COLUMNS, report.claims.iter().map(claim).collect());
-    put(&FAILURE_COLUMNS, report.aggregates.iter().filter_map(|row| failures(row, &report.errors)).collect());
+    let failed = report.aggregates.iter().filter_map(|row| failures(row, &report.errors, names));
+    put(&FAILURE_COLUMNS, failed.collect());
     put(&MODEL_COLUMNS, models::models(&report.models).iter().map(model).collect());
     if !report.notes.is_empty() {
         text.push('\n');
@@ -65,7 +68,7 @@ const ROBOT_COLUMNS: [Column<'static>; 9] = [
     ("paper: success, NTP, manipulation", false),
 ];
 
-fn robot(row: &RobotRow) -> Vec<String> {
+fn robot(row: &RobotRow, names: &SuiteNames) -> Vec<String> {
     let told = |share: Share| {
         let [rate, low, high] = [share.rate, share.wilson_low, share.wilson_high].map(percent);
         format!("{rate} % ({low} to {high})")
@@ -76,7 +79,7 @@ fn robot(row: &RobotRow) -> Vec<String> {
         format!("{} % of {}", shares.join(", "), paper.trials)
     };
     vec![
-        row.suite.clone(),
+        names.tell(&row.suite, &row.experiment),
         row.model.clone(),
         row.episodes.to_string(),
         told(row.success),
@@ -121,10 +124,10 @@ const DETECTION_COLUMNS: [Column<'static>; 12] = [
     ("paper's deviation", true),
 ];
 
-fn detection(error: &DetectionError) -> Vec<String> {
+fn detection(error: &DetectionError, names: &SuiteNames) -> Vec<String> {
     let [x, y, z] = error.mean_absolute_cm;
     vec![
-        error.suite.clone(),
+        names.tell(&error.suite, &error.experiment),
         error.variant.clone(),
         error.train_tasks.to_string(),
         error.seeds.to_string(),
@@ -150,7 +153,7 @@ const FAILURE_COLUMNS: [Column<'static>; 7] = [
 ];
 
 /// Why an actor's rollouts in a suite failed; nothing where none did.
-fn failures(row: &Aggregate, errors: &[FirstError]) -> Option<Vec<String>> {
+fn failures(row: &Aggregate, errors: &[FirstError], names: &SuiteNames) -> Option<Vec<String>> {
     let failed = row.episodes - row.successes;
     let causes = row.causes.iter().map(|(cause, count)| (*count, cause.clone()));
     let own = errors.iter().filter(|error| error.actor == row.actor && error.suite == row.suite);
@@ -158,7 +161,7 @@ fn failures(row: &Aggregate, errors: &[FirstError]) -> Option<Vec<String>> {
         let program = error.program.as_ref().map(|program| format!("{program}: ")).unwrap_or_default();
         (error.episodes, format!("{program}{}", error.error))
     });
-    let [suite, model, tasks, decoder] = told_apart(row);
+    let [suite, model, tasks, decoder] = told_apart(row, names);
     let (causes, firsts) = (most_first(causes.collect()), most_first(firsts.collect()));
     (failed > 0).then(|| vec![suite, model, tasks, decoder, failed.to_string(), causes, firsts])
 }
@@ -238,16 +241,16 @@ pub(super) fn made_by(report: &Report) -> String {
 }
 
 /// What tells rows apart: suite, model, training tasks, decoder.
-fn told_apart(row: &Aggregate) -> [String; 4] {
+fn told_apart(row: &Aggregate, names: &SuiteNames) -> [String; 4] {
     [
-        row.suite.clone(),
+        names.of_row(row),
         row.actor.model(),
         row.actor.train_tasks.map_or_else(none, |tasks| tasks.to_string()),
         row.actor.decoder.clone().unwrap_or_else(none),
     ]
 }
 
-fn row(row: &Aggregate) -> Vec<String> {
+fn row(row: &Aggregate, names: &SuiteNames) -> Vec<String> {
     let pair = |low: f64, high: f64| format!("[{low:.3}, {high:.3}]");
     let range = format!("{:.3}, {:.3}", row.lowest_success_rate, row.highest_success_rate);
     let of_seeds = row.seeds_low.zip(row.seeds_high);
@@ -261,7 +264,7 @@ fn row(row: &Aggregate) -> Vec<String> {
         of_seeds.map_or_else(none, |(low, high)| pair(low, high)),
         row.paper_success_rate.map_or_else(none, |rate| format!("{rate:.3}")),
     ];
-    told_apart(row).into_iter().chain(figures).collect()
+    told_apart(row, names).into_iter().chain(figures).collect()
 }
 
 /// A table whose columns stand one below the other in plain text too.

@@ -12,6 +12,7 @@ use crate::report::markdown;
 use crate::report::metrics::Curve;
 use crate::report::order;
 use crate::report::section::{Contents, SECTIONS};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::Report;
 use crate::words::counted;
 
@@ -37,8 +38,8 @@ pub(super) fn render(report: &Report, curves: &[Curve]) -> Result<String, miniji
     environment.add_template("charts.html.j2", include_str!("charts.html.j2"))?;
     environment.add_template("page.html.j2", include_str!("page.html.j2"))?;
     let experiments = distinct(report.aggregates.iter().map(|row| &row.actor.experiment));
-    let contents =
-        Contents { report, curves, leading: order::leading(&report.aggregates), is_study: experiments.len() > 1 };
+    let (leading, names) = (order::leading(&report.aggregates), SuiteNames::of(&report.aggregates));
+    let contents = Contents { report, curves, leading, names, is_study: experiments.len() > 1 };
     let mut sections = Vec::with_capacity(SECTIONS.len());
     for section in SECTIONS {
         environment.add_template(section.name, section.template)?;

@@ -18,6 +18,7 @@ mod success;
 use minijinja::Value;
 
 use crate::report::metrics::Curve;
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::{Aggregate, Report};
 
 /// One section.
@@ -36,6 +37,8 @@ pub(super) struct Contents<'a> {
     pub(super) curves: &'a [Curve],
     /// Of each model and suite the row that stands for it.
     pub(super) leading: Vec<Aggregate>,
+    /// How their suites are called.
+    pub(super) names: SuiteNames,
     /// Whether there is more than one experiment.
     pub(super) is_study: bool,
 }

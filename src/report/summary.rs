@@ -178,13 +178,6 @@ pub struct Aggregate {
     pub paper_success_rate: Option<f64>,
 }
 
-impl Aggregate {
-    /// Whether another row is of the same suite: of its name, in tasks of the same kind.
-    pub(super) fn is_same_suite(&self, other: &Self) -> bool {
-        (&self.suite, &self.facts) == (&other.suite, &other.facts)
-    }
-}
-
 /// Rollouts of a variant in a suite whose first departure from the expert is of one kind, at one decision.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 pub struct Divergence {

@@ -645,6 +645,24 @@ fn claims_and_figures_are_of_one_experiment() {
 }
 
 #[test]
+fn suites_of_one_name_are_told_with_their_experiments() {
+    let rows = [rollouts("ntp", "stacking_unseen", 9, 10), rollouts("ntp", "stacking_seen", 10, 10)].concat();
+    let mut run = Run::new(&rows);
+    let other = run.folder.path().join("rollouts/other/rollouts.parquet");
+    write_parquet(&other, rollouts_table(&rollouts("ntp", "stacking_unseen", 7, 10)));
+    run.inputs.rollouts.push(RolloutsInput { experiment: "twelve_blocks".to_owned(), ..input(other) });
+    run.make();
+    let experiment = &run.inputs.rollouts[0].experiment;
+    let (markdown, page) = (run.text("report.md"), run.text("index.html"));
+    for name in [format!("stacking_unseen of {experiment}"), "stacking_unseen of twelve_blocks".to_owned()] {
+        // Its success and its failures; on the page its dots, results, seeds and causes.
+        assert_eq!(markdown.lines().filter(|line| line.starts_with(&format!("| {name} "))).count(), 2, "{markdown}");
+        assert!(page.matches(&name).count() >= 4, "{name}: {}", page.matches(&name).count());
+    }
+    assert!(!markdown.contains("stacking_seen of"), "its name is enough: {markdown}");
+}
+
+#[test]
 fn tables_without_facts_are_read_and_nothing_of_the_paper_stands_beside() {
     let run = Run::new(&ten_rollouts());
     let later =

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Key, N_COLORS, Tick};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::Aggregate;
 use crate::trace::Cause;
 use crate::words::counted;
@@ -48,7 +49,7 @@ pub(in crate::report) struct BarPart {
 }
 
 /// Nothing without failures.
-pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
+pub(in crate::report) fn plot(aggregates: &[Aggregate], names: &SuiteNames) -> Option<BarPlot> {
     let share = |row: &Aggregate| (row.episodes - row.successes) as f64 / row.episodes.max(1) as f64;
     let highest = aggregates.iter().map(share).reduce(f64::max).filter(|&highest| highest > 0.0)?;
     let end = ENDS.into_iter().find(|&end| end >= highest).unwrap_or(1.0);
@@ -59,7 +60,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
         goals_met: row.goals_met.map(percent),
         parts: parts(row, &causes, end),
     };
-    let suite = |rows: &[Aggregate]| BarSuite { title: rows[0].suite.clone(), rows: rows.iter().map(row).collect() };
+    let suite = |rows: &[Aggregate]| BarSuite { title: names.of_row(&rows[0]), rows: rows.iter().map(row).collect() };
     let tick = |mark: usize| {
         let value = end * mark as f64 / N_STEPS as f64;
         Tick { at: place(value, 0.0, end), label: short(100.0 * value) }
@@ -70,7 +71,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate]) -> Option<BarPlot> {
             .iter()
             .map(|cause| Key { label: cause.replace('_', " "), color: color(cause), hollow: false })
             .collect(),
-        suites: aggregates.chunk_by(Aggregate::is_same_suite).map(suite).collect(),
+        suites: aggregates.chunk_by(|a, b| names.are_one(a, b)).map(suite).collect(),
     })
 }
 

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::report::chart::scale::{percent, place, short};
 use crate::report::chart::{Tick, color_of};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::{Aggregate, SuiteResult};
 
 /// Where the axis may begin, and the distance of its marks then.
@@ -50,7 +51,11 @@ pub(in crate::report) struct DotRow {
 }
 
 /// Nothing without results.
-pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult]) -> Option<DotPlot> {
+pub(in crate::report) fn plot(
+    aggregates: &[Aggregate],
+    results: &[SuiteResult],
+    names: &SuiteNames,
+) -> Option<DotPlot> {
     let lowest = |row: &Aggregate| {
         let paper = row.paper_success_rate.unwrap_or(1.0);
         row.wilson_low.min(row.lowest_success_rate).min(paper)
@@ -79,7 +84,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
         }
     };
     let suite = |rows: &[Aggregate]| DotSuite {
-        title: rows[0].suite.clone(),
+        title: names.of_row(&rows[0]),
         facts: rows[0].facts.words(),
         rows: rows.iter().map(row).collect(),
     };
@@ -90,7 +95,7 @@ pub(in crate::report) fn plot(aggregates: &[Aggregate], results: &[SuiteResult])
     };
     Some(DotPlot {
         ticks: (0..=n_steps).map(tick).collect(),
-        suites: aggregates.chunk_by(Aggregate::is_same_suite).map(suite).collect(),
+        suites: aggregates.chunk_by(|a, b| names.are_one(a, b)).map(suite).collect(),
         cut_at: (start > 0.0).then(|| short(100.0 * start)),
         has_paper: aggregates.iter().any(|row| row.paper_success_rate.is_some()),
         has_seeds: aggregates.iter().any(|row| row.seeds > 1),

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{percent, short, thousands};
 use crate::report::detections::{DetectionError, InSight};
 use crate::report::section::{Contents, Section};
+use crate::report::suite_names::SuiteNames;
 
 /// The section.
 pub(super) const SECTION: Section = Section {
@@ -40,13 +41,13 @@ struct DetectionRow {
 }
 
 fn fill(of: &Contents<'_>) -> Detectors {
-    Detectors { detections: of.report.detections.iter().map(row).collect() }
+    Detectors { detections: of.report.detections.iter().map(|error| row(error, &of.names)).collect() }
 }
 
-fn row(error: &DetectionError) -> DetectionRow {
+fn row(error: &DetectionError, names: &SuiteNames) -> DetectionRow {
     let cm = |value: f64| format!("{value:.2}");
     DetectionRow {
-        suite: error.suite.clone(),
+        suite: names.tell(&error.suite, &error.experiment),
         variant: error.variant.clone(),
         color: error.parts.color(false),
         tasks: thousands(error.train_tasks.max(0) as u64),

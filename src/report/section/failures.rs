@@ -28,7 +28,7 @@ fn fill(of: &Contents<'_>) -> Failures {
     let report = of.report;
     Failures {
         has_rollouts: !report.aggregates.is_empty(),
-        bars: bars::plot(&of.leading),
+        bars: bars::plot(&of.leading, &of.names),
         divergence: histogram::plot(&report.divergences, &report.errors, &report.aggregates),
         panel: PANEL,
         is_study: of.is_study,

@@ -9,6 +9,7 @@ use crate::report::chart::{Key, PANEL, Panel, color_of, once_each};
 use crate::report::figures::{Figure, Grid, Series};
 use crate::report::order;
 use crate::report::section::{Contents, Section};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::Aggregate;
 
 /// The section.
@@ -38,7 +39,7 @@ fn fill(of: &Contents<'_>) -> Figures {
         figure_keys: figure_keys(series()),
         has_paper_encoder: series().any(|series| series.parts.has_papers_encoder()),
         adversary: adversary(&report.figures),
-        pushes: report.aggregates.iter().filter_map(push_row).collect(),
+        pushes: report.aggregates.iter().filter_map(|row| push_row(row, &of.names)).collect(),
         heat: report.grids.iter().map(heat_grid).collect(),
         panel: PANEL,
         is_study: of.is_study,
@@ -100,11 +101,11 @@ struct PushRow {
     toppled_a_push: String,
 }
 
-fn push_row(row: &Aggregate) -> Option<PushRow> {
+fn push_row(row: &Aggregate, names: &SuiteNames) -> Option<PushRow> {
     let (pushes, toppled) = row.pushes.zip(row.toppled)?;
     let share = |count: u64, of: u64| format!("{:.2}", count as f64 / of.max(1) as f64);
     Some(PushRow {
-        suite: row.suite.clone(),
+        suite: names.of_row(row),
         variant: row.actor.words(),
         color: color_of(&row.actor),
         rollouts: thousands(row.episodes),

@@ -7,6 +7,7 @@ use crate::report::actor::Actor;
 use crate::report::chart::scale::{many, percent, points};
 use crate::report::order;
 use crate::report::section::{Contents, Section};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::Aggregate;
 
 /// The section.
@@ -41,10 +42,10 @@ struct Tile {
 }
 
 fn fill(of: &Contents<'_>) -> Headline {
-    Headline { tiles: tiles(&of.leading) }
+    Headline { tiles: tiles(&of.leading, &of.names) }
 }
 
-fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
+fn tiles(aggregates: &[Aggregate], names: &SuiteNames) -> Vec<Tile> {
     let rank = |row: &&Aggregate| {
         let Actor { variant, parts, .. } = &row.actor;
         (order::model(variant, parts, row.actor.is_oracle()), !row.actor.is_demonstrated())
@@ -52,7 +53,7 @@ fn tiles(aggregates: &[Aggregate]) -> Vec<Tile> {
     let lead = aggregates.iter().min_by_key(rank).map(|row| row.actor.model());
     let own = aggregates.iter().filter(|row| Some(row.actor.model()) == lead);
     let tile = |row: &Aggregate| Tile {
-        suite: row.suite.clone(),
+        suite: names.of_row(row),
         facts: row.facts.words(),
         variant: row.actor.words(),
         value: percent(row.mean_success_rate),

@@ -7,6 +7,7 @@ use crate::report::PaperValue;
 use crate::report::chart::color_of;
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::section::{Contents, Section};
+use crate::report::suite_names::SuiteNames;
 use crate::report::summary::{Aggregate, SuiteResult};
 
 /// The section.
@@ -26,8 +27,8 @@ struct Results<'a> {
 fn fill<'a>(of: &Contents<'a>) -> Results<'a> {
     let report = of.report;
     Results {
-        rows: rows(&report.aggregates),
-        seeds: report.results.iter().map(seed_row).collect(),
+        rows: rows(&report.aggregates, &of.names),
+        seeds: report.results.iter().map(|row| seed_row(row, &of.names)).collect(),
         paper: &report.paper,
     }
 }
@@ -85,10 +86,10 @@ struct SeedRow {
     sim_secs: String,
 }
 
-fn rows(aggregates: &[Aggregate]) -> Vec<Row> {
-    let starts_suite = |at: usize| at == 0 || !aggregates[at - 1].is_same_suite(&aggregates[at]);
+fn rows(aggregates: &[Aggregate], names: &SuiteNames) -> Vec<Row> {
+    let starts_suite = |at: usize| at == 0 || !names.are_one(&aggregates[at - 1], &aggregates[at]);
     let row = |(at, row): (usize, &Aggregate)| Row {
-        suite: row.suite.clone(),
+        suite: names.of_row(row),
         variant: row.actor.model(),
         tasks: row.actor.train_tasks.map(|tasks| thousands(tasks.max(0) as u64)),
         decoder: row.actor.decoder.clone(),
@@ -106,9 +107,9 @@ fn rows(aggregates: &[Aggregate]) -> Vec<Row> {
     aggregates.iter().enumerate().map(row).collect()
 }
 
-fn seed_row(row: &SuiteResult) -> SeedRow {
+fn seed_row(row: &SuiteResult, names: &SuiteNames) -> SeedRow {
     SeedRow {
-        suite: row.suite.clone(),
+        suite: names.tell(&row.suite, &row.actor.experiment),
         variant: row.actor.words(),
         seed: row.seed,
         successes: thousands(row.successes),

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::report::chart::scale::{percent, thousands};
 use crate::report::robot_table::{PaperRobot, RobotRow, Share};
 use crate::report::section::{Contents, Section};
+use crate::report::suite_names::SuiteNames;
 
 /// The section.
 pub(super) const SECTION: Section = Section {
@@ -61,7 +62,10 @@ fn fill(of: &Contents<'_>) -> RobotTable {
             paper.push(line);
         }
     }
-    RobotTable { paper: paper.iter().map(paper_line).collect(), rows: rows.iter().map(line).collect() }
+    RobotTable {
+        paper: paper.iter().map(paper_line).collect(),
+        rows: rows.iter().map(|row| line(row, &of.names)).collect(),
+    }
 }
 
 fn paper_line(line: &PaperRobot) -> PaperLine {
@@ -74,14 +78,14 @@ fn paper_line(line: &PaperRobot) -> PaperLine {
     }
 }
 
-fn line(row: &RobotRow) -> Line {
+fn line(row: &RobotRow, names: &SuiteNames) -> Line {
     let cell = |share: Share| Cell {
         rate: percent(share.rate),
         low: percent(share.wilson_low),
         high: percent(share.wilson_high),
     };
     Line {
-        suite: row.suite.clone(),
+        suite: names.tell(&row.suite, &row.experiment),
         model: row.model.clone(),
         facts: row.facts.clone(),
         trials: thousands(row.episodes),

@@ -19,5 +19,5 @@ struct Success {
 }
 
 fn fill(of: &Contents<'_>) -> Success {
-    Success { dots: dots::plot(&of.leading, &of.report.results) }
+    Success { dots: dots::plot(&of.leading, &of.report.results, &of.names) }
 }
