@@ -43,6 +43,8 @@ use crate::dataset::files::info::NtpInfo;
 use crate::dataset::files::layout;
 use crate::dataset::plain::{PlainSource, ProgramTables, has_programs, program_tables};
 
+use annotation::Kept;
+
 pub use condition::{Condition, Ending, EpisodeRange};
 pub use diff::{ChangedEpisode, Difference, EpisodeName, diff};
 pub use error::EditError;
@@ -145,6 +147,8 @@ fn write(
     settings: Value,
     mut is_wanted: impl FnMut(&EpisodeWords<'_>, &dyn Fn(&str) -> bool) -> bool,
 ) -> Result<EditSummary, EditError> {
+    let is_there = |root: &PathBuf| read_json::<serde::de::IgnoredAny>(&root.join(layout::INFO)).map(drop);
+    roots.iter().try_for_each(is_there)?;
     // Nothing is made of a file that is not, by its hash, as it was made.
     roots.iter().try_for_each(|root| StageDir::new("convert", root).check_whole())?;
     let is_own = |root: &PathBuf| program_tables(root) == ProgramTables::Own;
@@ -185,21 +189,25 @@ fn write_own(
         check_like(first, source)?;
     }
     let mut target = Target::create(folder, first)?;
-    let mut descriptions = Vec::new();
+    let (mut descriptions, mut kept) = (Vec::new(), Vec::new());
     let mut seen = Seen::default();
     let failed_left_out = sources.iter().map(|source| source.ntp.failed_left_out).sum();
     let path = first.root().to_owned();
     for mut source in sources {
         let begin = target.n_episodes();
         let mut description = describe(source.root())?;
+        let (mut numbers, mut n_source) = (Vec::new(), 0);
         while let Some(episode) = source.next_episode()? {
             if is_wanted(&episode) {
                 seen.note(source.root(), &episode.row)?;
                 target.append(&episode, &source)?;
+                numbers.push(n_source);
             } else {
                 target.leave_out(1);
             }
+            n_source += 1;
         }
+        kept.push(Kept { root: source.root().to_owned(), numbers, n_source, begin });
         description.episodes = [begin, target.n_episodes()];
         descriptions.push(description);
     }
@@ -207,7 +215,7 @@ fn write_own(
         return Err(EditError::refused("edit.empty", &path, "no episode is left: none is as it is asked for"));
     }
     let mut summary = target.finish(failed_left_out)?;
-    annotation::carry(roots, folder, &mut summary.files)?;
+    annotation::carry(&kept, folder, &mut summary)?;
     Ok((summary, descriptions))
 }
 

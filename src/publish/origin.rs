@@ -66,7 +66,8 @@ struct ModelTold {
     variant: String,
     #[serde(default)]
     version: Option<String>,
-    episodes: u64,
+    /// Nothing where it is not known.
+    episodes: Option<u64>,
 }
 
 impl Modelled {
@@ -76,7 +77,7 @@ impl Modelled {
                 model.version.as_ref().map(|version| format!(", version `{}`", version.get(..12).unwrap_or(version)));
             format!("`{}` (variant {}{})", model.name, model.variant, version.unwrap_or_default())
         };
-        let models: Vec<String> = told.models.iter().filter(|of| of.episodes > 0).map(model).collect();
+        let models: Vec<String> = told.models.iter().filter(|of| of.episodes != Some(0)).map(model).collect();
         Self {
             models: models.join(" and "),
             day: told.date.as_ref().map(|date| format!(" on {date}")).unwrap_or_default(),

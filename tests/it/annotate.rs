@@ -4,6 +4,7 @@ use std::path::Path;
 
 use ntp::annotate::{AnnotateConfig, Annotation, KeyFrames, Model, annotate, measure, parse};
 use ntp::artifact::read_json;
+use ntp::dataset::edit::{Carry, Condition, diff, filter, merge};
 use ntp::dataset::export::{LabelForm, export};
 use ntp::dataset::{ConvertConfig, FrameChoice, read_trials, schema, validate};
 use ntp::program::Program;
@@ -150,6 +151,41 @@ fn an_annotated_dataset_is_one_of_ours_with_a_confidence_for_each_call() {
     assert_eq!(told["measured"]["episodes_exact"], 6);
     let info: Value = read_json(&to.join("meta/info.json")).unwrap();
     assert_eq!(info["features"]["language_persistent"]["dtype"], "language");
+}
+
+#[test]
+fn an_annotated_dataset_is_edited_with_its_labels_its_words_and_what_is_told_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let episodes = episodes();
+    // Unsure of everything, so that each episode is listed.
+    annotated(&episodes, folder.path(), Knowing { probability: 0.1, ..Knowing::new(&episodes) });
+    let told = |name: &str| read_json::<Value>(&path(name).join("ntp/annotation.json")).unwrap();
+    let doubtful = |name: &str| -> Vec<u64> {
+        told(name)["doubtful"].as_array().unwrap().iter().map(|doubt| doubt["episode"].as_u64().unwrap()).collect()
+    };
+    assert_eq!(doubtful("new"), [0, 1, 2, 3, 4, 5]);
+    let some = |numbers: &[&str]| Condition {
+        episodes: numbers.iter().map(|numbers| numbers.parse().unwrap()).collect(),
+        ..Condition::default()
+    };
+    filter(&path("new"), &some(&["1", "4-5"]), &path("some"), Carry::Packets).unwrap();
+    assert_eq!(validate(&path("some")).findings, []);
+    assert_eq!(doubtful("some"), [0, 1, 2]);
+    let of_model = told("some")["models"][0].clone();
+    assert_eq!((of_model["episodes"].as_u64(), told("some")["episodes"].as_u64()), (Some(3), Some(3)));
+    assert_eq!(told("some")["measured"]["episodes"], 6, "as it was measured");
+    filter(&path("new"), &some(&["0", "2-3"]), &path("others"), Carry::Packets).unwrap();
+    merge(&[path("some"), path("others")], &path("all"), Carry::Packets).unwrap();
+    assert_eq!(validate(&path("all")).findings, []);
+    assert_eq!(doubtful("all"), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(told("all")["models"].as_array().unwrap().len(), 1);
+    assert_eq!((told("all")["models"][0]["episodes"].as_u64(), told("all").get("measured")), (Some(6), None));
+    // Calls, frames and language columns are those of before, in another order.
+    let difference = diff(&path("new"), &path("all")).unwrap();
+    assert!(difference.is_none() && difference.same == 6 && difference.moved == 6, "{difference:?}");
+    let info: Value = read_json(&path("all").join("meta/info.json")).unwrap();
+    assert_eq!(info["features"]["language_events"]["dtype"], "language");
 }
 
 #[test]

@@ -39,10 +39,8 @@ pub(super) fn check_version(source: &Source) -> Result<(), EditError> {
 fn feature_problem(name: &str, feature: &FeatureInfo) -> Option<(&'static str, String)> {
     let refused = |code, problem: String| Some((code, format!("feature {name:?} {problem}")));
     match feature.dtype {
-        Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool | Dtype::String => None,
-        Dtype::Language | Dtype::Other => {
-            refused("edit.features", "is of a type that cannot be carried over".to_owned())
-        }
+        Dtype::Float32 | Dtype::Float64 | Dtype::Int64 | Dtype::Bool | Dtype::String | Dtype::Language => None,
+        Dtype::Other => refused("edit.features", "is of a type that cannot be carried over".to_owned()),
         Dtype::Image | Dtype::Video if !matches!(feature.shape[..], [_, _, 3]) => {
             refused("edit.features", format!("has shape {:?}, but pictures are [height, width, 3]", feature.shape))
         }
