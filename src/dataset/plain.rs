@@ -18,7 +18,7 @@
 //!
 //! # Invariants
 //!
-//! Each episode's frames are row groups of one file. Memory holds one episode's numbers and 24 MB of pictures
+//! Each episode's frames are row groups of one file. Memory holds one episode's numbers and 12 MB of pictures
 //! of each feature, and the video files that are being written. The same rows give the same bytes, with any number of
 //! threads.
 

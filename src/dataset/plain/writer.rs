@@ -17,7 +17,7 @@ use crate::dataset::tables::texts::write::write_tasks;
 use crate::table::{BatchWriter, TableError, TextTable, Values, WriteOptions};
 
 /// Pictures of a feature that are held before they are written.
-const GROUP_BYTES: usize = 24 << 20;
+const GROUP_BYTES: usize = 12 << 20;
 const MEGABYTE: u32 = 1 << 20;
 
 /// What was written.
