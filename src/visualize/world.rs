@@ -11,7 +11,7 @@ use crate::visualize::store::Store;
 use crate::visualize::{VisualizeError, clock, lanes, palette};
 
 /// With more movable bodies than this, their names would hide the scene; they are shown on hovering anyway.
-const MAX_LABELLED: usize = 12;
+const MAX_LABELLED: usize = 8;
 const TABLE_THICKNESS_M: f32 = 0.02;
 /// Half of the thickness of drawn edges.
 const EDGE_RADIUS_M: f32 = 0.001;

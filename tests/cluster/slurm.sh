@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs a pipeline on three Slurm nodes, all of them plain processes of this machine, with nodes and controller killed at
+# Runs a pipeline or a study on three Slurm nodes, all of them plain processes of this machine, with nodes and controller killed at
 # random and an item that fails for good; then submits again. Every file must be that of one process.
-# Usage: slurm.sh NTP PIPELINE.toml WORK_DIR [KILLS]
+# Usage: slurm.sh NTP PIPELINE.toml|STUDY.toml WORK_DIR [KILLS]
 # Needs Debian's slurmctld, slurmd, slurm-client and munge, which are installed if apt-get is allowed to; nothing listens
 # outside of this machine, and nothing of a Slurm that is set up here is touched.
 set -euo pipefail
@@ -84,8 +84,11 @@ say "one process is done"
 
 # --- the cluster ---
 run=$work/run
+# What stages made, of each experiment of a study.
+parts=$(cd "$work/whole" && find . -type d \( -name tasks -o -name recordings -o -name dataset -o -name models -o -name rollouts \) -prune | sort)
 # An item that fails for good: something has taken the name of its recording.
-poison=$run/recordings/$(ls "$work/whole/recordings" | grep mcap | sed -n 2p)
+first=$(grep -m 1 'recordings$' <<< "$parts")
+poison=$run/$first/$(ls "$work/whole/$first" | grep mcap | sed -n 2p)
 mkdir -p "$poison/taken"
 submit() { "$ntp" submit "$pipeline" --out "$run" --engine slurm --per-task 1 >> "$work/submit.log" 2>&1; }
 queue() { timeout 10 squeue -h -r -o '%i %T' 2> /dev/null || true; }
@@ -167,7 +170,7 @@ done
 say "the cluster is done"
 
 # --- every file is that of one process, but for what tells of time and place ---
-for part in tasks recordings dataset models rollouts; do
+for part in $parts; do
   diff -r "$work/whole/$part" "$run/$part"
 done
-say "all $(find "$work/whole"/{tasks,recordings,dataset,models,rollouts} -type f | wc -l) files are identical"
+say "all $(cd "$work/whole" && find $parts -type f | wc -l) files are identical"
