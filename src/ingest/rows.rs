@@ -380,7 +380,7 @@ impl<'r, 'm> Reading<'r, 'm> {
             |source: VideoError| IngestError::Encode { feature: self.features[feature].map.name.clone(), source };
         let encoder = match &mut self.encoders[feature] {
             Some(encoder) => encoder,
-            none => none.insert(H264Encoder::new(size_px, self.map.fps).map_err(failed)?),
+            none => none.insert(H264Encoder::of_camera(size_px, self.map.fps).map_err(failed)?),
         };
         let Picture::Rgb(_, rgb) = picture else { return Ok(Cell::Image(picture)) };
         let mut packet = Vec::new();
