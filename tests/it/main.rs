@@ -12,7 +12,8 @@ mod arm_pipeline;
 mod artifact;
 #[cfg(test)]
 mod cli;
-#[cfg(all(test, feature = "cloud"))]
+#[cfg(test)]
+#[cfg(feature = "cloud")]
 mod cloud;
 #[cfg(test)]
 mod cluster;
