@@ -186,6 +186,13 @@ fn an_annotated_dataset_is_edited_with_its_labels_its_words_and_what_is_told_of_
     assert!(difference.is_none() && difference.same == 6 && difference.moved == 6, "{difference:?}");
     let info: Value = read_json(&path("all").join("meta/info.json")).unwrap();
     assert_eq!(info["features"]["language_events"]["dtype"], "language");
+    // What tells of the labels and is not as it was written is refused by its name, and nothing is made.
+    for damaged in [r#"{"models": ["ntp"]}"#, r#"{"models": [], "doubtful": [{"episode": "one"}]}"#, "[]", "{"] {
+        std::fs::remove_file(path("some").join("manifest.json")).ok();
+        std::fs::write(path("some").join("ntp/annotation.json"), damaged).unwrap();
+        let error = merge(&[path("some"), path("others")], &path("refused"), Carry::Packets).unwrap_err().to_string();
+        assert!(error.contains("some/ntp/annotation.json") && !path("refused").exists(), "{damaged}: {error}");
+    }
 }
 
 #[test]

@@ -2,16 +2,42 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::artifact::{IoError, read_json, write_json};
 use crate::dataset::edit::target::EditSummary;
 use crate::dataset::files::layout;
 
-/// What tells models apart.
-const MODEL: [&str; 4] = ["name", "variant", "family", "version"];
 /// What several sources must agree on to be told of all.
 const COMMON: [&str; 3] = ["date", "key_frames", "doubt_below"];
+
+/// What `ntp/annotation.json` tells: what changes by name, the rest as it is.
+#[derive(Clone, Deserialize, Serialize)]
+struct Told {
+    models: Vec<Model>,
+    /// Nothing where they were not listed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    doubtful: Option<Vec<Doubt>>,
+    #[serde(flatten)]
+    others: Map<String, Value>,
+}
+
+#[derive(Clone, Deserialize, Serialize)]
+struct Model {
+    /// How many episodes are its; nothing where it is not known.
+    episodes: Option<u64>,
+    /// What tells it apart.
+    #[serde(flatten)]
+    identity: Map<String, Value>,
+}
+
+#[derive(Clone, Deserialize, Serialize)]
+struct Doubt {
+    episode: u64,
+    #[serde(flatten)]
+    others: Map<String, Value>,
+}
 
 /// The episodes of a source that are in what is made.
 pub(super) struct Kept {
@@ -31,13 +57,12 @@ impl Kept {
     }
 
     /// How many of a model's episodes are kept, where that is known: of several models nothing tells whose an episode is.
-    fn episodes_of(&self, model: &Value, is_only: bool) -> Value {
-        let of_source = model["episodes"].as_u64();
-        match of_source {
-            Some(0) => json!(0),
-            Some(_) if is_only => json!(self.numbers.len()),
-            Some(all) if self.numbers.len() as u64 == self.n_source => json!(all),
-            _ => Value::Null,
+    fn episodes_of(&self, model: &Model, is_only: bool) -> Option<u64> {
+        let kept = self.numbers.len() as u64;
+        match model.episodes {
+            Some(1..) if is_only => Some(kept),
+            Some(1..) if kept < self.n_source => None,
+            all => all,
         }
     }
 }
@@ -45,37 +70,27 @@ impl Kept {
 /// Writes what the sources tell, with the numbers that episodes have now, and adds the file to those of `summary`. What
 /// was measured is told of one source alone: of several together nothing was.
 pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> Result<(), IoError> {
-    let mut told = Vec::new();
+    let mut told: Vec<(&Kept, Told)> = Vec::new();
     for kept in sources {
         let path = kept.root.join(layout::ANNOTATION);
         if path.is_file() {
-            told.push((kept, read_json::<Map<String, Value>>(&path)?));
+            told.push((kept, read_json(&path)?));
         }
     }
     let Some((_, first)) = told.first() else { return Ok(()) };
-    let mut carried = first.clone();
-    for key in COMMON {
-        if told.iter().any(|(_, other)| other.get(key) != first.get(key)) {
-            carried.remove(key);
-        }
-    }
-    if told.len() > 1 {
-        carried.remove("measured");
-    }
-    match doubtful(&told) {
-        Some(doubtful) => carried.insert("doubtful".to_owned(), Value::Array(doubtful)),
-        None => carried.remove("doubtful"),
-    };
-    carried.insert("models".to_owned(), Value::Array(models(&told)));
-    carried.remove("subtasks");
+    let mut others = first.others.clone();
+    let differs = |key: &str| told.iter().any(|(_, other)| other.others.get(key) != first.others.get(key));
+    others.retain(|key, _| !(COMMON.contains(&key.as_str()) && differs(key)));
+    others.retain(|key, _| key != "subtasks" && !(key == "measured" && told.len() > 1));
     for (key, count) in [
         ("episodes", summary.episodes),
         ("frames", summary.frames),
         ("calls", summary.calls),
         ("scopes", summary.scopes),
     ] {
-        carried.insert(key.to_owned(), json!(count));
+        others.insert(key.to_owned(), json!(count));
     }
+    let carried = Told { models: models(&told), doubtful: doubtful(&told), others };
     write_json(&to.join(layout::ANNOTATION), &carried)?;
     summary.files.push(layout::ANNOTATION.to_owned());
     summary.files.sort_unstable();
@@ -83,39 +98,25 @@ pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> R
 }
 
 /// The doubtful episodes that were kept; nothing where a source does not list them.
-fn doubtful(told: &[(&Kept, Map<String, Value>)]) -> Option<Vec<Value>> {
+fn doubtful(told: &[(&Kept, Told)]) -> Option<Vec<Doubt>> {
     let mut all = Vec::new();
     for (kept, told) in told {
-        for doubt in told.get("doubtful")?.as_array()? {
-            let number = doubt["episode"].as_u64().and_then(|number| kept.renumbered(number));
-            let mut doubt = doubt.clone();
-            if let (Some(number), Some(entry)) = (number, doubt.as_object_mut()) {
-                entry.insert("episode".to_owned(), json!(number));
-                all.push(doubt);
-            }
-        }
+        let moved = |doubt: &Doubt| Some(Doubt { episode: kept.renumbered(doubt.episode)?, ..doubt.clone() });
+        all.extend(told.doubtful.as_ref()?.iter().filter_map(moved));
     }
     Some(all)
 }
 
 /// Each model once, with how many of its episodes there are.
-fn models(told: &[(&Kept, Map<String, Value>)]) -> Vec<Value> {
-    let mut all: Vec<Value> = Vec::new();
+fn models(told: &[(&Kept, Told)]) -> Vec<Model> {
+    let mut all: Vec<Model> = Vec::new();
     for (kept, told) in told {
-        let models = told.get("models").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-        let is_only = models.iter().filter(|model| model["episodes"] != json!(0)).count() == 1;
-        for model in models {
+        let is_only = told.models.iter().filter(|model| model.episodes != Some(0)).count() == 1;
+        for model in &told.models {
             let episodes = kept.episodes_of(model, is_only);
-            match all.iter_mut().find(|known| MODEL.iter().all(|key| known[*key] == model[*key])) {
-                Some(known) => {
-                    let sum = known["episodes"].as_u64().zip(episodes.as_u64()).map(|(a, b)| a + b);
-                    known["episodes"] = json!(sum);
-                }
-                None => {
-                    let mut model = model.clone();
-                    model["episodes"] = episodes;
-                    all.push(model);
-                }
+            match all.iter_mut().find(|known| known.identity == model.identity) {
+                Some(known) => known.episodes = known.episodes.zip(episodes).map(|(a, b)| a + b),
+                None => all.push(Model { episodes, identity: model.identity.clone() }),
             }
         }
     }
