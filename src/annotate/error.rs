@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::artifact::{IoError, StagingError};
+use crate::artifact::{ContractError, IoError, StagingError};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::model::ModelError;
@@ -24,6 +24,9 @@ pub enum AnnotateError {
     /// The folder could not be made.
     #[error(transparent)]
     Staging(#[from] StagingError),
+    /// A model is not as it was made.
+    #[error(transparent)]
+    Contract(#[from] ContractError),
     /// A model could not be loaded.
     #[error(transparent)]
     Model(#[from] ModelError),

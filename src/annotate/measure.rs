@@ -98,6 +98,11 @@ pub fn measure(truth: &Path, labelled: &Path) -> Result<Measured, AnnotateError>
                 return Err(differ(problem));
             }
         };
+        if right.recording().zip(found.recording()).is_some_and(|(there, here)| there != here) {
+            let problem =
+                format!("episode {} is of another recording than there; they are compared in order", all.episodes);
+            return Err(differ(problem));
+        }
         all.add(&right, &found);
         let pairs = right.levels().into_iter().zip(found.levels());
         for (tally, (right_labels, found_labels)) in levels.iter_mut().zip(pairs) {

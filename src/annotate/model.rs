@@ -24,6 +24,7 @@ impl Model {
     /// When it cannot be loaded, or gives no parts of the demonstration to what it calls, or reads anything but
     /// observations.
     pub fn load(path: &Path, decoder: Decoder) -> Result<Self, AnnotateError> {
+        StageDir::new("train", path).check_whole()?;
         let (config, policy) = load_policy(path, decoder)?;
         let refused = |found: String| AnnotateError::Variant { path: path.to_owned(), found };
         if !policy.scoping().has_scopes() {

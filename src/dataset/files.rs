@@ -2,6 +2,7 @@
 //!
 //! Knows nothing of what is in a table.
 
+pub(in crate::dataset) mod annotation;
 pub(crate) mod cursor;
 pub(crate) mod error;
 pub(crate) mod finding;

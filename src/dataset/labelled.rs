@@ -129,6 +129,13 @@ impl Iterator for LabelledEpisodes {
 }
 
 impl LabelledEpisode {
+    /// The recording of ours that it comes from, by hash, and its number there; nothing where it comes from elsewhere.
+    pub fn recording(&self) -> Option<(&str, i64)> {
+        let row = &self.row;
+        let is_known = row.recording.ends_with(".mcap") && !row.recording_sha256.is_empty();
+        is_known.then_some((row.recording_sha256.as_str(), row.recording_index))
+    }
+
     /// How many frames it has.
     pub fn n_frames(&self) -> u32 {
         self.times_secs.len() as u32

@@ -40,16 +40,17 @@ use crate::trace::ProgramCall;
 pub fn validate(root: &Path) -> Validation {
     let mut validation = Validation::default();
     let tables = program_tables(root);
-    if tables != ProgramTables::Own {
+    // One that cannot be read is found below.
+    let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
+    let annotated = info.ok().filter(|info| info.annotated_by.is_some());
+    if tables != ProgramTables::Own || annotated.is_some() {
         plain::check(root, &mut validation);
         meta::check_card(root, &mut validation);
     }
     if tables == ProgramTables::None {
         return validation;
     }
-    // One that cannot be read is found below.
-    let info = read_json::<NtpInfo>(&root.join(layout::NTP_INFO));
-    if let Some(info) = info.ok().filter(|info| info.annotated_by.is_some()) {
+    if let Some(info) = annotated {
         validation = Validation { episodes: 0, frames: 0, ..validation };
         let texts = read_all_texts(root, &mut validation);
         let check = if info.has_our_programs() { by_model::check } else { annotated::check };

@@ -196,6 +196,70 @@ fn an_annotated_dataset_is_edited_with_its_labels_its_words_and_what_is_told_of_
 }
 
 #[test]
+fn an_annotated_dataset_is_held_against_the_rules_of_lerobot_and_what_is_told_of_its_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let episodes = episodes();
+    annotated(&episodes, folder.path(), Knowing::new(&episodes));
+    let (new, statistics) = (folder.path().join("new"), "meta/stats.json");
+    let told = |name: &str| new.join("ntp").join(name);
+    let codes_with = |path: &Path, content: &str| {
+        let before = std::fs::read(path).unwrap();
+        std::fs::write(path, content).unwrap();
+        let found = validate(&new).findings;
+        std::fs::write(path, before).unwrap();
+        found.into_iter().map(|finding| (finding.code, finding.message)).collect::<Vec<_>>()
+    };
+    let check = |path: &Path, content: &str, code: &str, words: &str| {
+        let found = codes_with(path, content);
+        assert!(found.iter().any(|(found, message)| *found == code && message.contains(words)), "{content}: {found:?}");
+    };
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 9\n";
+    check(&new.join(statistics), "{", "file.unreadable", "");
+    check(&new.join(statistics), pointer, "file.pointer", "");
+    let annotation = told("annotation.json");
+    check(&annotation, "{", "file.unreadable", "");
+    check(&annotation, pointer, "file.pointer", "");
+    check(&annotation, r#"{"models": []}"#, "annotation.value", "models");
+    let models = r#""models": [{"name": "ntp", "variant": "ntp", "episodes": 6}]"#;
+    let doubt = format!(r#"{{{models}, "doubtful": [{{"episode": 6}}]}}"#);
+    check(&annotation, &doubt, "annotation.value", "no episode 6; there are 6");
+    let measured = format!(r#"{{{models}, "measured": {{"calls": 3, "calls_with_span": 4}}}}"#);
+    check(&annotation, &measured, "annotation.value", "calls_with_span is 4 and calls 3");
+    assert_eq!(validate(&new).findings, []);
+}
+
+#[test]
+fn labels_are_written_in_one_form_once_and_compared_with_those_of_the_same_recordings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let episodes = episodes();
+    annotated(&episodes, folder.path(), Knowing::new(&episodes));
+    let error = export(&path("new"), LabelForm::Language, &path("twice")).unwrap_err().to_string();
+    assert!(error.contains("language_persistent already") && !path("twice").exists(), "{error}");
+    // The same episodes in another order, as many frames each.
+    let order = |first: &str, then: &str| {
+        let one = |number: &str, to: &str| {
+            let condition = Condition { episodes: vec![number.parse().unwrap()], ..Condition::default() };
+            filter(&path("new"), &condition, &path(to), Carry::Packets).unwrap();
+        };
+        one(first, "first");
+        one(then, "then");
+        merge(&[path("first"), path("then")], &path("turned"), Carry::Packets).unwrap();
+    };
+    order("1", "0");
+    let condition = Condition { episodes: vec!["0-1".parse().unwrap()], ..Condition::default() };
+    filter(&path("new"), &condition, &path("straight"), Carry::Packets).unwrap();
+    let error = measure(&path("straight"), &path("turned")).unwrap_err().to_string();
+    assert!(error.contains("frame") || error.contains("another recording"), "{error}");
+    assert_eq!(measure(&path("straight"), &path("straight")).unwrap().episodes_exact, 2);
+    // What is copied as it is is looked at before.
+    std::fs::write(path("own").join("meta/tasks.parquet"), "PAR1").unwrap();
+    let mut models = [Knowing::new(&episodes).boxed(Family::BlockStacking, 8)];
+    let error = annotate(&path("own"), &mut models, &path("no"), &config(), None).unwrap_err().to_string();
+    assert!(error.contains("meta/tasks.parquet") && !path("no").exists(), "{error}");
+}
+
+#[test]
 fn a_dataset_without_a_word_of_ours_is_annotated_too() {
     let folder = tempfile::tempdir().unwrap();
     let (own, theirs, to) = ["own", "theirs", "new"].map(|name| folder.path().join(name)).into();

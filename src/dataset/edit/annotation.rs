@@ -2,42 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use crate::artifact::{IoError, read_json, write_json};
 use crate::dataset::edit::target::EditSummary;
+use crate::dataset::files::annotation::{Doubt, Model, Told};
 use crate::dataset::files::layout;
 
 /// What several sources must agree on to be told of all.
 const COMMON: [&str; 3] = ["date", "key_frames", "doubt_below"];
-
-/// What `ntp/annotation.json` tells: what changes by name, the rest as it is.
-#[derive(Clone, Deserialize, Serialize)]
-struct Told {
-    models: Vec<Model>,
-    /// Nothing where they were not listed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    doubtful: Option<Vec<Doubt>>,
-    #[serde(flatten)]
-    others: Map<String, Value>,
-}
-
-#[derive(Clone, Deserialize, Serialize)]
-struct Model {
-    /// How many episodes are its; nothing where it is not known.
-    episodes: Option<u64>,
-    /// What tells it apart.
-    #[serde(flatten)]
-    identity: Map<String, Value>,
-}
-
-#[derive(Clone, Deserialize, Serialize)]
-struct Doubt {
-    episode: u64,
-    #[serde(flatten)]
-    others: Map<String, Value>,
-}
 
 /// The episodes of a source that are in what is made.
 pub(super) struct Kept {

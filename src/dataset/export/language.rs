@@ -37,6 +37,12 @@ pub(crate) struct Entry {
 /// Writes the dataset with both columns.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
     let (info, reader) = LabelReader::open(root)?;
+    let is_there = |name: &&str| info.features.0.iter().any(|(declared, _)| declared == name);
+    if let Some(name) = [PERSISTENT, EVENTS].into_iter().find(is_there) {
+        let problem =
+            format!("it has the feature {name} already, so its labels are in this form; allowed: other forms");
+        return Err(EditError::refused("edit.features", &root.join(layout::INFO), problem));
+    }
     let mut language = Language { reader, fps: info.fps, open: Vec::new(), frames_left: 0, n_entries: 0 };
     let declared = || FeatureInfo { dtype: Dtype::Language, shape: vec![1], names: None, info: None };
     let features = [PERSISTENT, EVENTS].map(|name| (name.to_owned(), declared()));

@@ -68,6 +68,8 @@ pub(super) fn write(
     write_episodes(root, to, &written.episodes, &written.statistics)?;
     write_subtasks(to, &written.subtasks)?;
     let tasks = root.join(layout::TASKS);
+    let mut reader = BatchReader::open(&tasks, BATCH_ROWS)?;
+    while reader.next_batch()?.is_some() {}
     std::fs::copy(&tasks, to.join(layout::TASKS)).map_err(IoError::system("copy", &tasks))?;
     write_ntp_info(root, to, slots, &written, summary)?;
     write_statistics(root, to, written.statistics)?;

@@ -5,11 +5,18 @@
 
 use std::path::Path;
 
+use std::collections::BTreeSet;
+
+use arrow::array::AsArray as _;
+use arrow::datatypes::Float32Type;
+
+use crate::artifact::read_json;
 use crate::dataset::DatasetError;
+use crate::dataset::files::annotation::Told;
 use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::finding::Validation;
 use crate::dataset::files::info::Info;
-use crate::dataset::files::layout;
+use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::tables::episodes::check::EpisodeCheck;
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::tables::frames;
@@ -19,9 +26,11 @@ use crate::dataset::tables::frames::paths::ProgramPaths;
 use crate::dataset::tables::texts::read::Texts;
 use crate::dataset::tables::texts::subtask::subtask_text;
 use crate::dataset::validate::Tables;
-use crate::table::{TextTable, batch};
+use crate::table::{BatchReader, TextTable, batch};
 use crate::trace::ProgramCall;
 
+/// Rows of calls that are read at a time.
+const BATCH_ROWS: usize = 8192;
 /// How far `timestamp` may be from `frame_index / fps`: what LeRobot allows.
 const TOLERANCE_SECS: f64 = 1e-4;
 
@@ -50,10 +59,12 @@ pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> 
         scopes: Some(Cursor::new(root, layout::SCOPES)),
     };
     let (mut frames, mut episodes) = (ModelFrames::new(root, &info), EpisodeCheck::default());
-    let mut calls = Vec::new();
+    let (mut calls, mut places, mut n_episodes) = (Vec::new(), BTreeSet::new(), 0);
     while let Some(row) = rows.next() {
         let row = row?;
         validation.episodes += 1;
+        n_episodes += 1;
+        places.insert(row.calls);
         episodes.check(rows.path(), &row, n_slots, validation);
         let calls_are_there = tables.check_calls(&row, n_slots, &mut calls, validation);
         if calls_are_there {
@@ -62,7 +73,45 @@ pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> 
         tables.check_scopes(&row, calls_are_there.then_some(&calls), validation);
     }
     tables.finish(validation);
+    check_annotation(root, n_episodes, validation);
+    for place in places {
+        check_confidences(root, place, validation)?;
+    }
     if tables.calls.is_some() { frames.finish() } else { Ok(()) }
+}
+
+/// What is told of the labels.
+fn check_annotation(root: &Path, n_episodes: u64, validation: &mut Validation) {
+    let path = root.join(layout::ANNOTATION);
+    match read_json::<Told>(&path) {
+        Err(error) => validation.error("file.unreadable", &path, String::new(), error.to_string()),
+        Ok(told) => {
+            if let Some(problem) = told.problem(n_episodes) {
+                validation.error("annotation.value", &path, String::new(), problem);
+            }
+        }
+    }
+}
+
+/// How sure the models are of each call of a file, which is a share.
+fn check_confidences(root: &Path, place: FilePlace, validation: &mut Validation) -> Result<(), DatasetError> {
+    let path = place.in_dataset(root, layout::CALLS);
+    let (mut reader, mut row) = (BatchReader::open(&path, BATCH_ROWS)?, 0);
+    while let Some(rows) = reader.next_batch()? {
+        let column = rows.column_by_name("confidence").and_then(|column| column.as_primitive_opt::<Float32Type>());
+        let Some(confidences) = column else {
+            let problem = "there is no column confidence of type float; a model says how sure it is".to_owned();
+            validation.error("file.columns", &path, String::new(), problem);
+            return Ok(());
+        };
+        if let Some(at) = confidences.values().iter().position(|confidence| !(0.0..=1.0).contains(confidence)) {
+            let problem = format!("confidence is {}, but a share is between 0 and 1", confidences.value(at));
+            validation.error("calls.row", &path, format!("row {}", row + at), problem);
+            return Ok(());
+        }
+        row += rows.num_rows();
+    }
+    Ok(())
 }
 
 /// Checks the frames of one episode after another.
