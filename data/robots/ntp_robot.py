@@ -123,6 +123,11 @@ class Robot:
     def configure(self, arguments):
         """Take what your options say."""
 
+    @property
+    def stopped(self):
+        """Whether to stand still: a stop came, or the other side has gone. To be looked at in whatever takes long."""
+        return self._stopped.is_set()
+
     def serve(self, reader, writer):
         """Answers line by line until the other side has gone; the robot is stopped then."""
         self._writer, self._writing = writer, threading.Lock()

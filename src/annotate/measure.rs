@@ -87,7 +87,16 @@ pub fn measure(truth: &Path, labelled: &Path) -> Result<Measured, AnnotateError>
     let differ = |problem: String| AnnotateError::Truth { path: truth.to_owned(), problem };
     let (mut right, mut found) = (LabelledEpisodes::open(truth)?, LabelledEpisodes::open(labelled)?);
     loop {
-        let (right, found) = match (right.next().transpose()?, found.next().transpose()?) {
+        let pair = (right.next().transpose()?, found.next().transpose()?);
+        if let (Some(right), Some(found)) = &pair
+            && right.recording().zip(found.recording()).is_some_and(|(there, here)| there != here)
+        {
+            let episode = all.episodes;
+            return Err(differ(format!(
+                "episode {episode} is of another recording than there; they are compared in order"
+            )));
+        }
+        let (right, found) = match pair {
             (None, None) => break,
             (Some(right), Some(found)) if right.n_frames() == found.n_frames() => (right, found),
             (right, found) => {
@@ -98,11 +107,6 @@ pub fn measure(truth: &Path, labelled: &Path) -> Result<Measured, AnnotateError>
                 return Err(differ(problem));
             }
         };
-        if right.recording().zip(found.recording()).is_some_and(|(there, here)| there != here) {
-            let problem =
-                format!("episode {} is of another recording than there; they are compared in order", all.episodes);
-            return Err(differ(problem));
-        }
         all.add(&right, &found);
         let pairs = right.levels().into_iter().zip(found.levels());
         for (tally, (right_labels, found_labels)) in levels.iter_mut().zip(pairs) {

@@ -39,8 +39,14 @@ pub(super) fn run(args: &ActArgs, stop: &Arc<AtomicBool>) -> anyhow::Result<Comm
     let session = session(args, &trials[0], stop)?;
     let acted = match args.dry_run {
         true => {
-            let tell = |line: &str| {
-                let _closed = output::print(line);
+            // Beside a result in JSON there is nothing else on standard output.
+            let is_json = args.json;
+            let tell = move |line: &str| {
+                if is_json {
+                    output::note(line);
+                } else {
+                    let _closed = output::print(line);
+                }
             };
             let rehearsal = rehearse(&session, trials[0].task.family, tell)?;
             vec![trials[0].act(&mut driver, &rehearsal, 0, false)?]

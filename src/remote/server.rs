@@ -22,6 +22,8 @@ use crate::task::{self, Bodies, Family};
 use crate::trace::{Cause, Frame};
 
 const NAME: &str = "ntp-simulation";
+/// How high a target may be, and the gripper above it, in metres: what `ntp_robot.py` allows.
+const HIGHEST_M: f32 = 1.0;
 const METHODS: &str = "hello, reset, observe, move_to, grip, release, settle, carry, stop";
 
 /// JSON-RPC's codes, and one for what cannot be done now.
@@ -154,9 +156,8 @@ impl SimulatedRobot {
                 return self.still(Some(carried));
             }
             "move_to" => {
-                let Target { slot, .. } = parse(params)?;
-                let names = scene.slots.iter().map(|slot| slot.name.as_str());
-                Action::MoveTo(SlotIndex(position("slot", &slot, names)?))
+                let target: Target = parse(params)?;
+                Action::MoveTo(slot_of(scene, &target)?)
             }
             "grip" => Action::Grip,
             "release" => Action::Release,
@@ -193,6 +194,25 @@ impl SimulatedRobot {
         let Answer { observation, .. } = self.still(None)?.1;
         Ok((on_the_way, Answer { cause, observation }))
     }
+}
+
+/// The slot of a target, whose body must be one of its bodies, and over the table.
+fn slot_of(scene: &Scene, target: &Target) -> Result<SlotIndex, Refusal> {
+    let Target { slot, body, position_m, hover_m } = target;
+    let names = scene.slots.iter().map(|slot| slot.name.as_str());
+    let index = SlotIndex(position("slot", slot, names)?);
+    let of_slot = &scene.slots[usize::from(index.0)].bodies;
+    let bodies: Vec<&str> = of_slot.iter().map(|body| scene.body(*body).name.as_str()).collect();
+    if !bodies.contains(&body.as_str()) {
+        return Err((NO_PARAMS, format!("body {body} of slot {slot}; allowed: {}", bodies.join(", "))));
+    }
+    let [x, y] = scene.table_half_m;
+    let is_over = position_m.iter().zip([x, y, HIGHEST_M]).all(|(part, limit)| part.abs() <= limit);
+    if !(is_over && (0.0..=HIGHEST_M).contains(hover_m)) {
+        let allowed = format!("{x} m, {y} m and {HIGHEST_M} m either way, 0 to {HIGHEST_M} m above");
+        return Err((NO_PARAMS, format!("target {position_m:?}, {hover_m} m above; allowed: {allowed}")));
+    }
+    Ok(index)
 }
 
 /// The counts of a trial that has such a scene: of each slot that is counted its bodies, but 0 for a single one that

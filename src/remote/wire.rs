@@ -205,9 +205,20 @@ impl Drop for Process {
             }
             std::thread::sleep(GLANCE);
         }
+        kill_group(&self.child);
         let _gone = self.child.kill().and_then(|()| self.child.wait());
     }
 }
+
+/// Ends what the shell has started too: a robot that hangs must not outlive us.
+#[cfg(unix)]
+fn kill_group(leader: &Child) {
+    let group = leader.id().to_string();
+    let _gone = Command::new("sh").args(["-c", "kill -s KILL -- \"-$0\"", &group]).stderr(Stdio::null()).status();
+}
+
+#[cfg(not(unix))]
+fn kill_group(_leader: &Child) {}
 
 /// A robot that listens.
 struct Tcp {

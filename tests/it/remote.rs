@@ -502,6 +502,43 @@ fn trials_that_have_ended_outlive_a_kill() {
     assert!(String::from_utf8_lossy(&again.stderr).contains("only a new or empty folder is written"));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_robot_that_hangs_does_not_outlive_the_command_nor_does_what_it_has_started() {
+    let folder = recording();
+    // Reads nothing, answers nothing, and has started something that goes on.
+    let robot = "sleep 1000 & echo $! > started; trap '' INT TERM; while :; do sleep 1; done";
+    let output = Command::new(binary())
+        .args(["act", "oracle", "--demonstration", "shown.mcap", "--robot", robot, "--deadline", "1"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && stderr.contains("no answer"), "{stderr}");
+    let started = std::fs::read_to_string(folder.path().join("started")).unwrap();
+    // Gone, or dead and not yet buried.
+    let state = std::fs::read_to_string(format!("/proc/{}/stat", started.trim())).unwrap_or_default();
+    assert!(state.is_empty() || state.contains(") Z "), "{state}");
+}
+
+#[test]
+fn our_own_robot_goes_to_bodies_of_the_slot_over_the_table_alone() {
+    let mut ours = SimulatedRobot::new(tower("t", &[4, 1], Split::Unseen).family, SimulationConfig::default(), Seed(0));
+    let task = tower("t", &[4, 1], Split::Unseen);
+    let (shown, sent) = (demonstration(&task, &trial(&task, 0, 1), 0), Lines::default());
+    let trials = trials(&shown);
+    greet(Spoiled::new(simulated(&trials), usize::MAX, Ok, &sent), &trials);
+    ours.answer(&sent.lines()[0]);
+    let mut ask = |body: &str, position: &str, hover: &str| {
+        let target = format!(r#"{{"slot":"block_A","body":"{body}","position_m":{position},"hover_m":{hover}}}"#);
+        ours.answer(&format!(r#"{{"id":2,"method":"move_to","params":{target}}}"#)).concat()
+    };
+    assert!(ask("nobody", "[0,0,0.03]", "0.1").contains("body nobody of slot block_A; allowed: block_A"));
+    assert!(ask("block_A", "[9,9,9]", "0.1").contains("target [9.0, 9.0, 9.0], 0.1 m above; allowed:"));
+    assert!(ask("block_A", "[0,0,0.03]", "99").contains("99 m above; allowed:"));
+    assert!(ask("block_A", "[0,0,0.03]", "0.1").contains(r#""result""#));
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_stops_the_robot_and_keeps_what_was_seen() {

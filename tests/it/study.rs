@@ -63,7 +63,7 @@ fn a_study_runs_each_experiment_as_by_itself_and_reports_them_together() {
     let (code, told, _) = run(&["validate", &out]);
     assert!(code == 0 && told.contains("out/two/dataset") && told.contains("out/report"), "{told}");
     let (code, markdown, _) = files.run("report", "pair.toml", "out", &[]);
-    assert!(code == 0 && markdown.contains("| stacking_unseen | ntp "), "{markdown}");
+    assert!(code == 0 && markdown.contains("| stacking_unseen of one | ntp "), "{markdown}");
 }
 
 #[test]

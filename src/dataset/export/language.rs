@@ -37,12 +37,6 @@ pub(crate) struct Entry {
 /// Writes the dataset with both columns.
 pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> {
     let (info, reader) = LabelReader::open(root)?;
-    let is_there = |name: &&str| info.features.0.iter().any(|(declared, _)| declared == name);
-    if let Some(name) = [PERSISTENT, EVENTS].into_iter().find(is_there) {
-        let problem =
-            format!("it has the feature {name} already, so its labels are in this form; allowed: other forms");
-        return Err(EditError::refused("edit.features", &root.join(layout::INFO), problem));
-    }
     let mut language = Language { reader, fps: info.fps, open: Vec::new(), frames_left: 0, n_entries: 0 };
     let declared = || FeatureInfo { dtype: Dtype::Language, shape: vec![1], names: None, info: None };
     let features = [PERSISTENT, EVENTS].map(|name| (name.to_owned(), declared()));
@@ -81,7 +75,7 @@ impl Language {
             n_left -= n_frames;
         }
         let columns = columns(&entries, positions, &lengths).map_err(EditError::rows(layout::DATA))?;
-        with_columns(rows, columns).map_err(EditError::rows(layout::DATA))
+        without_words(rows).and_then(|rows| with_columns(&rows, columns)).map_err(EditError::rows(layout::DATA))
     }
 
     /// Reads the next episode that has frames; false after the last one.
@@ -92,6 +86,12 @@ impl Language {
         self.n_entries += self.open.len() as u64;
         Ok(true)
     }
+}
+
+/// The rows without words of before, which are those of the same calls.
+fn without_words(rows: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let is_kept = |at: &usize| ![PERSISTENT, EVENTS].contains(&rows.schema_ref().field(*at).name().as_str());
+    rows.project(&(0..rows.num_columns()).filter(is_kept).collect::<Vec<_>>())
 }
 
 /// What an episode says, in order of time.

@@ -59,7 +59,7 @@ fn write_info(root: &Path, to: &Path, info: &Info, further: Vec<(String, Feature
     let path = to.join(layout::INFO);
     if program_tables(root) == ProgramTables::Own {
         let mut info = info.clone();
-        info.features.0.retain(|(name, _)| !is_ours(name));
+        info.features.0.retain(|(name, _)| !is_ours(name) && further.iter().all(|(other, _)| other != name));
         info.features.0.extend(further);
         return Ok(write_json(&path, &info)?);
     }
