@@ -16,7 +16,7 @@ use crate::pipeline::unit::{Amount, Job, Looked, Unit, Worker};
 use crate::pipeline::{Pipeline, PipelineError, RunDir, Stage, Study, costs, rollout, train};
 
 /// Raised when a report says something else of the same results.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// The report of an experiment, or of all of a study.
 pub(super) struct Report<'p> {
