@@ -13,8 +13,8 @@
 //!
 //! # Invariants
 //!
-//! Memory holds some thousand rows of each table and one video file, whatever the number of episodes; and an entry for each recording and
-//! distinct task. The same sources and settings give the same bytes. Sources are never written to.
+//! Memory holds some thousand rows of each table and one video file, whatever the number of episodes; an entry for each
+//! recording and distinct task; and the number of each episode. The same sources and settings give the same bytes. Sources are never written to.
 
 mod annotation;
 mod condition;
@@ -44,7 +44,6 @@ use crate::dataset::files::layout;
 use crate::dataset::plain::{PlainSource, ProgramTables, has_programs, program_tables};
 
 use annotation::Kept;
-
 pub use condition::{Condition, Ending, EpisodeRange};
 pub use diff::{ChangedEpisode, Difference, EpisodeName, diff};
 pub use error::EditError;
@@ -147,6 +146,7 @@ fn write(
     settings: Value,
     mut is_wanted: impl FnMut(&EpisodeWords<'_>, &dyn Fn(&str) -> bool) -> bool,
 ) -> Result<EditSummary, EditError> {
+    // What is not there is named before its programs are held against those of others.
     let is_there = |root: &PathBuf| read_json::<serde::de::IgnoredAny>(&root.join(layout::INFO)).map(drop);
     roots.iter().try_for_each(is_there)?;
     // Nothing is made of a file that is not, by its hash, as it was made.

@@ -3,9 +3,8 @@
 //! Its calls are of our programs, and the rules of our trees hold. Its frames are anyone's: of these, order, times and
 //! labels are checked.
 
-use std::path::Path;
-
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use arrow::array::AsArray as _;
 use arrow::datatypes::Float32Type;
