@@ -11,6 +11,7 @@
 mod atomic;
 mod contract;
 mod lock;
+mod open;
 mod plan;
 mod record;
 mod stage_dir;
@@ -23,6 +24,7 @@ pub use atomic::{
 };
 pub use contract::{ContractError, FileEntry, Manifest, Receipt};
 pub use lock::{LockError, RunLock};
+pub use open::{is_pointer, open};
 pub use plan::Plan;
 pub use stage_dir::{Committed, StageDir};
 pub use staging::{StagedDir, StagingError};

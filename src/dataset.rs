@@ -40,8 +40,10 @@ mod validate;
 mod write;
 
 pub use config::{ActionChoice, ConvertConfig, FailedEpisodes, FrameChoice};
+pub(crate) use files::annotation::{Model as AnnotationModelTold, Told as AnnotationTold};
 pub use files::error::{ConvertError, DatasetError};
 pub use files::finding::{Finding, Severity, Validation};
+pub(crate) use files::info::BY_MODEL;
 pub(crate) use files::layout::ANNOTATION;
 pub use labelled::{FrameLabel, LabelledEpisode, LabelledEpisodes};
 pub use pictures::{EpisodePictures, EpisodeRows, PictureLoader, Wanted};

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
+use crate::artifact::open::{open, refuse_pointer};
 use crate::artifact::unfinished::Unfinished;
 
 /// How names begin of what is not whole yet.
@@ -35,6 +36,12 @@ pub enum IoError {
         /// What is there.
         found: &'static str,
     },
+    /// Content that lies in Git LFS was not fetched.
+    #[error("{}: it is a Git LFS pointer and not the file itself: fetch it with `git lfs pull`", path.display())]
+    Pointer {
+        /// Which file.
+        path: PathBuf,
+    },
     /// The content is not the JSON it should be.
     #[error("{}:{}:{}: {source}", path.display(), source.line(), source.column())]
     Json {
@@ -49,7 +56,10 @@ impl IoError {
     /// The file that it is about.
     pub fn path(&self) -> &Path {
         match self {
-            Self::System { path, .. } | Self::NoFile { path, .. } | Self::Json { path, .. } => path,
+            Self::System { path, .. }
+            | Self::NoFile { path, .. }
+            | Self::Pointer { path }
+            | Self::Json { path, .. } => path,
         }
     }
 
@@ -231,9 +241,11 @@ pub fn create_dir(path: &Path) -> Result<(), IoError> {
 ///
 /// # Errors
 ///
-/// When it is not there or cannot be read.
+/// When it is not there, cannot be read, or is a pointer of Git LFS.
 pub fn read(path: &Path) -> Result<Vec<u8>, IoError> {
-    std::fs::read(path).map_err(IoError::system("read", path))
+    let bytes = std::fs::read(path).map_err(IoError::system("read", path))?;
+    refuse_pointer(path, &bytes)?;
+    Ok(bytes)
 }
 
 /// Writes a whole file atomically.
@@ -304,7 +316,7 @@ pub fn sha256_bytes(bytes: &[u8]) -> String {
 ///
 /// When it cannot be read.
 pub fn sha256_file(path: &Path) -> Result<String, IoError> {
-    let file = File::open(path).map_err(IoError::system("open", path))?;
+    let file = open(path)?;
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let mut hasher = Sha256::new();
     let mut buffer = vec![0_u8; 1 << 18];

@@ -2,12 +2,11 @@
 //!
 //! Knows nothing of what is in a table.
 
-pub(in crate::dataset) mod annotation;
+pub(crate) mod annotation;
 pub(crate) mod cursor;
 pub(crate) mod error;
 pub(crate) mod finding;
 pub(crate) mod info;
 pub(crate) mod layout;
-pub(crate) mod pointer;
 pub(crate) mod rolling;
 pub(crate) mod stated;

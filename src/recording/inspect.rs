@@ -12,7 +12,7 @@ use super::error::{MessageProblem, RecordingError};
 use super::index::{self, Index};
 use super::schema::{SCHEMA_VERSION, Topic, proto};
 use super::stream::{RawMessage, Stream};
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 
 /// What a recording holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -70,7 +70,7 @@ pub struct TopicInspection {
 ///
 /// As [`super::ShardReader`], but for the rules of single episodes, which are not looked into.
 pub fn inspect(path: &Path) -> Result<RecordingInspection, RecordingError> {
-    let mut file = File::open(path).map_err(IoError::system("open", path))?;
+    let mut file = artifact::open(path)?;
     let index = Index::read(path, &mut file)?;
     let mut found = overview(path, &mut file, &index)?;
     let mut tasks = BTreeSet::new();

@@ -1,7 +1,6 @@
 //! The messages of any MCAP file, whoever wrote it, in the order of the file.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +10,7 @@ use mcap::records::{Record, op};
 
 use super::error::{Damage, RecordingError};
 use super::stream::{RawMessage, Stream, damaged};
-use crate::artifact::IoError;
+use crate::artifact;
 
 /// A channel as the file declares it, with its schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,7 +48,7 @@ pub(crate) fn read_messages<E: From<RecordingError>>(
     path: &Path,
     mut visit: impl FnMut(&AnyMessage<'_>) -> Result<ControlFlow<()>, E>,
 ) -> Result<(), E> {
-    let file = File::open(path).map_err(|error| RecordingError::from(IoError::system("open", path)(error)))?;
+    let file = artifact::open(path).map_err(RecordingError::from)?;
     let mut schemas: BTreeMap<u16, Schema> = BTreeMap::new();
     let mut channels: BTreeMap<u16, Arc<AnyChannel>> = BTreeMap::new();
     let refused = Stream::whole(path, file)?.records(|opcode, record, offset| {

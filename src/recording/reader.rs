@@ -10,7 +10,7 @@ use super::decode::check_pictures;
 use super::error::RecordingError;
 use super::index::Index;
 use super::stream::{RawMessage, Stream};
-use crate::artifact::{IoError, Plan};
+use crate::artifact::{self, Plan};
 use crate::render::CameraConfig;
 use crate::task::Family;
 use crate::trace::{Boundaries, Episode, TraceError};
@@ -242,7 +242,7 @@ fn pictures(cameras: Vec<Filmed>) -> Vec<CameraPictures> {
 }
 
 fn open(path: &Path) -> Result<File, RecordingError> {
-    Ok(File::open(path).map_err(IoError::system("open", path))?)
+    Ok(artifact::open(path)?)
 }
 
 /// Gives a message to the assembler, and an error its place.

@@ -28,7 +28,7 @@ use super::sink::ZSTD_LEVEL;
 use super::stream::{RawMessage, Stream, damaged};
 use super::survey::is_metadata;
 use super::writer::{commit_in_order, failed};
-use crate::artifact::{AtomicFile, IoError};
+use crate::artifact::{self, AtomicFile, IoError};
 
 /// What became of an MCAP file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -61,7 +61,7 @@ pub struct Lost {
 /// Whether a file is a recording of ours, cut off or not: its metadata record comes before its first message.
 pub fn is_own(path: &Path) -> bool {
     let first = || -> Result<Option<bool>, RecordingError> {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let file = artifact::open(path)?;
         Stream::whole(path, file)?.records(|opcode, record, _offset| {
             Ok(match opcode {
                 op::METADATA if is_metadata(record) => ControlFlow::Break(true),
@@ -113,7 +113,7 @@ fn walk(
     path: &Path,
     mut visit: impl FnMut(u8, &[u8], u64) -> Result<(), RecordingError>,
 ) -> Result<Vec<Lost>, RecordingError> {
-    let file = File::open(path).map_err(IoError::system("open", path))?;
+    let file = artifact::open(path)?;
     let size = file.metadata().map_err(IoError::system("read", path))?.len();
     let mut records = FileRecords::whole(file).map_err(|error| match error {
         McapError::BadMagic => RecordingError::NotMcap { path: path.to_owned() },

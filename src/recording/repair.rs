@@ -4,7 +4,6 @@
 //! or picture that is wrong; nothing behind it is looked at. What cameras saw is kept as it is.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +21,7 @@ use super::sink::PLAN;
 use super::stream::{RawMessage, Stream, damaged};
 use super::survey::{declare, is_metadata};
 use super::writer::{ShardSummary, ShardWriter};
-use crate::artifact::{IoError, Plan, read_json};
+use crate::artifact::{self, Plan, read_json};
 use crate::trace::Episode;
 
 /// Where the plan of a repaired recording is from.
@@ -127,7 +126,7 @@ impl Salvage {
 
     /// Reads up to the end, or to what is wrong.
     fn run(&mut self) -> Result<(), RecordingError> {
-        let file = File::open(&self.path).map_err(IoError::system("open", &self.path))?;
+        let file = artifact::open(&self.path)?;
         let mut stream = Stream::whole(&self.path, file)?;
         let end: Option<()> = stream.records(|opcode, record, offset| {
             self.record(opcode, record, offset)?;

@@ -11,7 +11,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 use parquet::arrow::arrow_writer::{ArrowWriter, ArrowWriterOptions};
 use parquet::arrow::{ArrowSchemaConverter, ProjectionMask};
 
-use crate::artifact::{AtomicFile, IoError};
+use crate::artifact::{self, AtomicFile};
 use crate::table::guard::guarded;
 use crate::table::schema::ParsedSchema;
 use crate::table::write::{WriteOptions, properties};
@@ -63,7 +63,7 @@ impl BatchReader {
         settings: impl FnOnce(FileReaderBuilder) -> FileReaderBuilder,
     ) -> Result<Self, TableError> {
         guarded(path, || {
-            let file = File::open(path).map_err(IoError::system("open", path))?;
+            let file = artifact::open(path)?;
             let builder = FileReaderBuilder::try_new(file).map_err(TableError::parquet(path))?;
             let schema = Arc::clone(builder.schema());
             let footer = builder.metadata().file_metadata();

@@ -1,6 +1,5 @@
 //! The type of each column of any Parquet file, in words.
 
-use std::fs::File;
 use std::path::Path;
 
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
@@ -9,7 +8,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use super::error::TableError;
 use super::guard::guarded;
-use crate::artifact::IoError;
+use crate::artifact;
 
 /// The columns of a file in order, each with the types of the values in it: one, but for structs. Only the footer is
 /// read.
@@ -19,7 +18,7 @@ use crate::artifact::IoError;
 /// When the file is not there, or is truncated or corrupted.
 pub fn column_types(path: &Path) -> Result<Vec<(String, Vec<String>)>, TableError> {
     guarded(path, || {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let file = artifact::open(path)?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer = ArrowReaderMetadata::load(&file, options).map_err(TableError::parquet(path))?;
         let mut columns: Vec<(String, Vec<String>)> = Vec::new();

@@ -10,7 +10,7 @@ use parquet::arrow::arrow_reader::{
 };
 use parquet::file::metadata::PageIndexPolicy;
 
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 use crate::table::guard::guarded;
 use crate::table::read::find_roots;
 use crate::table::{ColumnKind, Form, TableError, TableSchema, Value};
@@ -36,7 +36,7 @@ impl PictureReader {
     /// When the file is not there, is damaged, or has no such column of pictures.
     pub(crate) fn open(path: &Path, schema: &TableSchema, column: &str) -> Result<Self, TableError> {
         guarded(path, || {
-            let file = File::open(path).map_err(IoError::system("open", path))?;
+            let file = artifact::open(path)?;
             let options = ArrowReaderOptions::new()
                 .with_skip_arrow_metadata(true)
                 .with_offset_index_policy(PageIndexPolicy::Optional);

@@ -3,7 +3,6 @@
 //! `LeRobot` declares arrays of several dimensions as extension types of `datasets`. They stand in the footer alone: the
 //! rows are lists, which every reader knows.
 
-use std::fs::File;
 use std::io::Seek as _;
 use std::path::Path;
 
@@ -12,7 +11,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::file::metadata::{FileMetaData, ParquetMetaData, ParquetMetaDataWriter};
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 use crate::table::TableError;
 use crate::table::guard::guarded;
 
@@ -26,7 +25,7 @@ const EXTENSION: &str = "ARROW:extension:name";
 /// When the file cannot be read, or there is no room for a copy.
 pub(crate) fn without_extensions(path: &Path) -> Result<Option<TempPath>, TableError> {
     guarded(path, || {
-        let mut file = File::open(path).map_err(IoError::system("open", path))?;
+        let mut file = artifact::open(path)?;
         let footer = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new()).map_err(TableError::parquet(path))?;
         let fields = footer.schema().flattened_fields();
         if !fields.iter().any(|field| field.metadata().contains_key(EXTENSION)) {

@@ -1,6 +1,5 @@
 //! Reading: whole tables, or in batches so that memory does not grow with the file.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,7 +12,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
-use crate::artifact::IoError;
+use crate::artifact;
 use crate::table::arrays::append_array;
 use crate::table::guard::guarded;
 use crate::table::{Column, ColumnKind, Columns, Form, TableError, TableSchema};
@@ -96,7 +95,7 @@ impl TableReader {
         columns: Vec<(String, ColumnKind)>,
         form: impl Fn(ArrowReaderMetadata) -> Result<ArrowReaderMetadata, ParquetError>,
     ) -> Result<Self, TableError> {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let file = artifact::open(path)?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let metadata = ArrowReaderMetadata::load(&file, options).and_then(form).map_err(TableError::parquet(path))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
@@ -243,7 +242,7 @@ fn by_words(metadata: ArrowReaderMetadata) -> Result<ArrowReaderMetadata, Parque
 /// When the file is not there, or is truncated or corrupted.
 pub fn file_columns(path: &Path) -> Result<Vec<(String, Option<ColumnKind>)>, TableError> {
     guarded(path, || {
-        let file = File::open(path).map_err(IoError::system("open", path))?;
+        let file = artifact::open(path)?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer = ArrowReaderMetadata::load(&file, options).map_err(TableError::parquet(path))?;
         let fields = footer.metadata().file_metadata().schema().get_fields();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use re_mp4::Mp4;
 
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 use crate::table::catch_panic;
 use crate::video::VideoError;
 
@@ -16,7 +16,7 @@ const MOST_VISITS: u32 = 100;
 /// An MP4 file's boxes, the file, and how long it is.
 pub(super) fn read_container(path: &Path) -> std::result::Result<(Mp4, File, u64), VideoError> {
     let wrong = |message: String| VideoError::Container { path: path.to_owned(), message };
-    let file = File::open(path).map_err(IoError::system("open", path))?;
+    let file = artifact::open(path)?;
     let len = file.metadata().map_err(IoError::system("read", path))?.len();
     let reader = Watched::new(BufReader::new(file.try_clone().map_err(IoError::system("open", path))?));
     // The library indexes by numbers that it reads; a damaged file must not end the program.

@@ -1,36 +1,57 @@
 //! What `ntp/annotation.json` tells of labels that models made.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::artifact::{IoError, create_dir, read_json};
+use crate::dataset::files::layout::ANNOTATION;
+
 /// What `ntp/annotation.json` tells: what changes by name, the rest as it is.
 #[derive(Clone, Deserialize, Serialize)]
-pub(in crate::dataset) struct Told {
-    pub(in crate::dataset) models: Vec<Model>,
+pub(crate) struct Told {
+    pub(crate) models: Vec<Model>,
     /// Nothing where they were not listed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(in crate::dataset) doubtful: Option<Vec<Doubt>>,
+    pub(crate) doubtful: Option<Vec<Doubt>>,
     #[serde(flatten)]
-    pub(in crate::dataset) others: Map<String, Value>,
+    pub(crate) others: Map<String, Value>,
 }
 
 #[derive(Clone, Deserialize, Serialize)]
-pub(in crate::dataset) struct Model {
+pub(crate) struct Model {
     /// How many episodes are its; nothing where it is not known.
-    pub(in crate::dataset) episodes: Option<u64>,
+    pub(crate) episodes: Option<u64>,
     /// What tells it apart.
     #[serde(flatten)]
-    pub(in crate::dataset) identity: Map<String, Value>,
+    pub(crate) identity: Map<String, Value>,
 }
 
 #[derive(Clone, Deserialize, Serialize)]
-pub(in crate::dataset) struct Doubt {
+pub(crate) struct Doubt {
     pub(in crate::dataset) episode: u64,
     #[serde(flatten)]
     pub(in crate::dataset) others: Map<String, Value>,
 }
 
+/// Copies the file, where it is there, to what holds the same labels of the same episodes.
+pub(in crate::dataset) fn copy(root: &Path, to: &Path) -> Result<(), IoError> {
+    let (from, to) = (root.join(ANNOTATION), to.join(ANNOTATION));
+    if !from.is_file() {
+        return Ok(());
+    }
+    to.parent().map_or(Ok(()), create_dir)?;
+    std::fs::copy(&from, &to).map(|_bytes| ()).map_err(IoError::system("copy", &from))
+}
+
 impl Told {
+    /// What is told of a dataset; nothing where the file is not there.
+    pub(crate) fn of(root: &Path) -> Result<Option<Self>, IoError> {
+        let path = root.join(ANNOTATION);
+        path.is_file().then(|| read_json(&path)).transpose()
+    }
+
     /// What cannot be true of a dataset of so many episodes.
     pub(in crate::dataset) fn problem(&self, n_episodes: u64) -> Option<String> {
         let unknown = self.doubtful.iter().flatten().find(|doubt| doubt.episode >= n_episodes);

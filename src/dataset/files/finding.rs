@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::artifact::is_pointer;
 use crate::dataset::DatasetError;
-use crate::dataset::files::pointer::pointer_problem;
 use crate::table::TableError;
 
 /// Findings that are kept; those after it are only counted.
@@ -68,8 +68,12 @@ impl Validation {
     }
 
     pub(crate) fn error(&mut self, code: &'static str, path: &Path, place: String, message: String) {
-        let pointer = if code == "file.unreadable" { pointer_problem(path) } else { None };
-        let (code, message) = pointer.map_or((code, message), |problem| ("file.pointer", problem.to_owned()));
+        let is_of_git_lfs = code == "file.unreadable" && is_pointer(path);
+        let code = if is_of_git_lfs { "file.pointer" } else { code };
+        let message = match message.strip_prefix(&format!("{}: ", path.display())) {
+            Some(rest) => rest.to_owned(),
+            None => message,
+        };
         self.add(Finding { code, severity: Severity::Error, path: path.to_owned(), place, message });
     }
 
@@ -107,8 +111,6 @@ impl Validation {
 
     fn unreadable(&mut self, error: &TableError) {
         let path = error.path().unwrap_or(Path::new(""));
-        let text = error.to_string();
-        let message = text.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&text).to_owned();
         let code = match error {
             TableError::MissingColumn { .. } | TableError::ColumnKind { .. } | TableError::UnknownColumn { .. } => {
                 "file.columns"
@@ -116,6 +118,6 @@ impl Validation {
             TableError::Null { .. } => "file.null",
             _ => "file.unreadable",
         };
-        self.error(code, path, String::new(), message);
+        self.error(code, path, String::new(), error.to_string());
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 use crate::dataset::DatasetError;
 use crate::dataset::files::stated::parse;
 use crate::dataset::plain::PlainInfo;
@@ -39,7 +39,7 @@ impl EpisodeStatistics {
             return Ok(None);
         }
         let path = info.root().join(FILE);
-        let mut file = BufReader::new(File::open(&path).map_err(IoError::system("open", &path))?);
+        let mut file = BufReader::new(artifact::open(&path)?);
         let mut lines = BTreeMap::new();
         let (mut begin, mut row, mut line) = (0, 0, String::new());
         while let n_bytes @ 1.. = next_line(&path, &mut file, &mut line)? {

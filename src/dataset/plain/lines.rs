@@ -1,12 +1,11 @@
 //! Files of JSON, an object a line, as older datasets have them.
 
-use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use serde_json::Value;
 
-use crate::artifact::IoError;
+use crate::artifact::{self, IoError};
 use crate::dataset::DatasetError;
 
 /// Takes each line that is not empty; what is wrong with one is named by its row, from 0.
@@ -14,7 +13,7 @@ pub(crate) fn json_lines<T>(
     path: &Path,
     mut take: impl FnMut(u64, &Value) -> Result<T, String>,
 ) -> Result<Vec<T>, DatasetError> {
-    let file = File::open(path).map_err(IoError::system("open", path))?;
+    let file = artifact::open(path)?;
     let mut taken = Vec::new();
     for line in BufReader::new(file).lines() {
         let line = line.map_err(IoError::system("read", path))?;

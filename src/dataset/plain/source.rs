@@ -6,7 +6,6 @@ use crate::artifact::read_json;
 use crate::dataset::DatasetError;
 use crate::dataset::files::info::BY_MODEL;
 use crate::dataset::files::layout;
-use crate::dataset::files::pointer::pointer_problem;
 use crate::dataset::plain::declared::PlainInfo;
 use crate::dataset::plain::episode::{PlainEpisode, read_episodes};
 use crate::dataset::plain::listing::parquet_files;
@@ -31,9 +30,16 @@ pub(crate) fn program_tables(root: &Path) -> ProgramTables {
     match read_json::<serde_json::Value>(&path) {
         Ok(info) if info["annotated_by"].as_str().is_some_and(|by| by != BY_MODEL) => ProgramTables::Annotated,
         // What cannot be read is found by whoever reads it.
-        _ if path.parent().is_some_and(Path::is_dir) => ProgramTables::Own,
+        _ if has_tables(root) => ProgramTables::Own,
         _ => ProgramTables::None,
     }
+}
+
+/// Whether there is more than the word of who made labels, which datasets without tables have too.
+fn has_tables(root: &Path) -> bool {
+    let Some(folder) = Path::new(layout::ANNOTATION).parent() else { return false };
+    let Ok(mut entries) = std::fs::read_dir(root.join(folder)) else { return false };
+    entries.any(|entry| entry.is_ok_and(|entry| !Path::new(layout::ANNOTATION).ends_with(entry.file_name())))
 }
 
 /// Whether a dataset has tables of programs.
@@ -58,10 +64,6 @@ pub(crate) struct PlainSource {
 impl PlainSource {
     /// Opens a dataset; no frame is read.
     pub(crate) fn open(root: &Path) -> Result<Self, DatasetError> {
-        Self::open_unnamed(root).map_err(named_pointer)
-    }
-
-    fn open_unnamed(root: &Path) -> Result<Self, DatasetError> {
         let info = PlainInfo::read(root)?;
         let tasks = read_tasks(root, info.version)?;
         let subtasks = read_subtasks(root)?;
@@ -143,17 +145,4 @@ fn data_files(info: &PlainInfo, episodes: &[PlainEpisode]) -> Result<Vec<PathBuf
         return Ok(episodes.iter().map(|episode| info.data_file(episode.data.unwrap_or_default())).collect());
     }
     Ok(parquet_files(&info.root().join(layout::DATA))?)
-}
-
-/// An error of a file that is not the file itself says so.
-fn named_pointer(error: DatasetError) -> DatasetError {
-    let path = match &error {
-        DatasetError::Table(table) => table.path().map(Path::to_owned),
-        DatasetError::Io(io) => Some(io.path().to_owned()),
-        _ => None,
-    };
-    match path.as_deref().and_then(|path| Some((path, pointer_problem(path)?))) {
-        Some((path, problem)) => DatasetError::Count { path: path.to_owned(), problem: problem.to_owned() },
-        None => error,
-    }
 }

@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::artifact::read_json;
+use crate::artifact::{IoError, is_pointer, read_json};
 use crate::dataset::DatasetError;
 use crate::dataset::files::info::{Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
-use crate::dataset::files::pointer::pointer_problem;
 use crate::dataset::plain::{EPISODE_LINES, PlainSource, has_programs};
 use crate::dataset::schema::{CALLS, EPISODES, FRAMES, SCOPES, SUBTASKS, TASKS};
 use crate::table::{Column, TableReader, TableSchema};
@@ -37,8 +36,8 @@ pub fn table_files(root: &Path) -> Result<Vec<(&'static str, TableFiles)>, Datas
 }
 
 fn plain_tables(source: PlainSource) -> Result<Vec<(&'static str, TableFiles)>, DatasetError> {
-    if let Some((path, problem)) = source.data_files.iter().find_map(|path| Some((path, pointer_problem(path)?))) {
-        return Err(DatasetError::Count { path: path.clone(), problem: problem.to_owned() });
+    if let Some(path) = source.data_files.iter().find(|path| is_pointer(path)) {
+        return Err(IoError::Pointer { path: path.clone() }.into());
     }
     let root = source.info.root().to_owned();
     let mut tables = Vec::new();

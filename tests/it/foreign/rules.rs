@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use crate::foreign::mini::{CAMERA, doubles, lists};
 use crate::foreign::{Mini, one, whole};
+use crate::pipeline::run;
 
 /// A change of a dataset before it is written.
 type Change = Box<dyn FnOnce(&mut Mini)>;
@@ -288,6 +289,27 @@ fn a_pointer_of_git_lfs_is_named_as_one() {
     std::fs::write(folder.path().join("data/chunk-000/file-000.parquet"), pointer).unwrap();
     let error = Tables::default().add_dataset(folder.path()).unwrap_err().to_string();
     assert!(error.contains("git lfs pull"), "{error}");
+    // Every command that reads what a file should hold names it.
+    let dataset = folder.path().to_str().unwrap().to_owned();
+    let recording = folder.path().join("lab.mcap");
+    std::fs::write(&recording, pointer).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let to = elsewhere.path().join("to").to_str().unwrap().to_owned();
+    let recording = recording.to_str().unwrap().to_owned();
+    for command in [
+        vec!["dataset", "filter", &dataset, "--episodes", "0", "--to", &to],
+        vec!["dataset", "import", &dataset, "--to", &to],
+        vec!["inspect", &recording],
+        vec!["validate", &recording],
+        vec!["repair", &recording, "--to", &to],
+        vec!["ingest", &recording, "--propose"],
+    ] {
+        let (code, stdout, stderr) = run(&command);
+        assert!(
+            code == 1 && format!("{stdout}{stderr}").contains("git lfs pull"),
+            "{command:?}: {code} {stdout}{stderr}"
+        );
+    }
 }
 
 #[test]
