@@ -38,6 +38,7 @@ mod sample;
 mod track;
 mod value;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::artifact::StagedDir;
@@ -49,12 +50,24 @@ pub use error::IngestError;
 pub use map::Map;
 pub use propose::propose;
 
+/// Refuses a file that is there twice, by whatever name.
+fn check_apart(files: &[PathBuf]) -> Result<(), IngestError> {
+    let mut seen = BTreeSet::new();
+    for path in files {
+        if !seen.insert(path.canonicalize().unwrap_or_else(|_gone| path.clone())) {
+            return Err(IngestError::Twice { path: path.clone() });
+        }
+    }
+    Ok(())
+}
+
 /// Writes a dataset of recordings.
 ///
 /// # Errors
 ///
-/// When a file is damaged, lacks a topic of the map, or there is something at `to`.
+/// When a file is given twice, is damaged, lacks a topic of the map, or there is something at `to`.
 pub fn ingest(files: &[PathBuf], map: &Map, to: &Path) -> Result<IngestSummary, IngestError> {
+    check_apart(files)?;
     let features = probe::features(files, map)?;
     let staged = StagedDir::begin(to)?;
     let observer = probe::observer(&files[0], map, &features)?;

@@ -8,6 +8,9 @@ use crate::words::counted;
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<CommandOutcome> {
     let [first, ..] = args.files.as_slice() else { return Err(UsageError("no recording".to_owned()).into()) };
     if args.propose {
+        if args.files.len() > 1 {
+            return Err(UsageError("--propose looks at one recording; give one".to_owned()).into());
+        }
         output::print(propose(first)?.trim_end())?;
         return Ok(CommandOutcome::Done);
     }

@@ -18,6 +18,12 @@ pub enum IngestError {
         /// What is wrong, where, and what is allowed.
         problem: String,
     },
+    /// A file is given more than once.
+    #[error("each of its messages would be there twice, since it is given twice: {}", path.display())]
+    Twice {
+        /// Which file.
+        path: PathBuf,
+    },
     /// A file is damaged.
     #[error(transparent)]
     Recording(#[from] RecordingError),

@@ -72,7 +72,13 @@ impl ObservationsMap {
     pub(super) fn scene(&self) -> Result<Scene, String> {
         match (self.family, self.slots.as_slice()) {
             (Some(family), []) => Ok(task::scene(family, &self.counts)),
-            (None, [_, ..]) => Ok(of_names(&self.slots)),
+            (None, names @ [_, ..]) => match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+                Some((_, twice)) => Err(format!("observations.slots: {twice:?} stands twice")),
+                None if names.iter().any(String::is_empty) => {
+                    Err("observations.slots: a name is empty; allowed are names of objects".to_owned())
+                }
+                None => Ok(of_names(names)),
+            },
             _ => Err("observations: either family, or slots with the names of objects".to_owned()),
         }
     }

@@ -359,6 +359,21 @@ fn what_a_map_names_and_a_file_lacks_is_told_with_what_there_is() {
     assert!(error.ends_with("map.toml: fps is 0; it is 1 to 1000"), "{error}");
     let error = refused(&joint_map("last").replace("max_age_secs", "max_age"));
     assert!(error.contains("unknown field `max_age`"), "{error}");
+    let pose = "{ topic = \"/tf\", field = \"transforms[child_frame_id={}].translation\" }";
+    let slots = |names: &str| {
+        let settings =
+            format!("slots = {names}\ngripper = {pose}\nopening = {pose}\nclosed_below_m = 0.06\nobjects = {pose}");
+        refused(&format!("{}\n[observations]\n{settings}\n", joint_map("last").replace("observation.state", "other")))
+    };
+    let error = slots("[\"cup\", \"mug\", \"cup\"]");
+    assert!(error.ends_with("observations.slots: \"cup\" stands twice"), "{error}");
+    let error = slots("[\"cup\", \"\"]");
+    assert!(error.contains("observations.slots: a name is empty"), "{error}");
+    let twice = [case.files(), case.files()].concat();
+    std::fs::write(case.path("map.toml"), joint_map("last")).unwrap();
+    let error =
+        ingest(&twice, &Map::read(&case.path("map.toml")).unwrap(), &case.path("dataset")).unwrap_err().to_string();
+    assert!(error.contains("it is given twice: ") && error.ends_with("bag-0.mcap"), "{error}");
     let error = refused(&joint_map("last").replace("observation.state", "timestamp"));
     assert!(error.contains("is none of timestamp, frame_index"), "{error}");
 
