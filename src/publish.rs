@@ -30,6 +30,7 @@ mod error;
 mod facts;
 mod files;
 mod license;
+mod modelled;
 mod origin;
 mod provenance;
 mod publication;

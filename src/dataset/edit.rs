@@ -196,18 +196,18 @@ fn write_own(
     for mut source in sources {
         let begin = target.n_episodes();
         let mut description = describe(source.root())?;
-        let (mut numbers, mut n_source) = (Vec::new(), 0);
+        let (mut numbers, mut n_source) = (BTreeMap::new(), 0);
         while let Some(episode) = source.next_episode()? {
             if is_wanted(&episode) {
                 seen.note(source.root(), &episode.row)?;
+                numbers.insert(n_source, target.n_episodes());
                 target.append(&episode, &source)?;
-                numbers.push(n_source);
             } else {
                 target.leave_out(1);
             }
             n_source += 1;
         }
-        kept.push(Kept { root: source.root().to_owned(), numbers, n_source, begin });
+        kept.push(Kept { root: source.root().to_owned(), numbers, n_source });
         description.episodes = [begin, target.n_episodes()];
         descriptions.push(description);
     }

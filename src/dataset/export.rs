@@ -31,7 +31,8 @@ pub(in crate::dataset) use plain::{copy_folder, with_columns};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LabelForm {
-    /// A `LeRobotDataset` with the column `subtask_index` and `meta/subtasks.parquet`, and nothing of ours.
+    /// A `LeRobotDataset` with the column `subtask_index` and `meta/subtasks.parquet`, and nothing of ours but
+    /// `ntp/annotation.json` where a model made the labels.
     SubtaskIndex,
     /// The same with `LeRobot`'s language columns: what goes on at each moment, in words.
     Language,

@@ -47,6 +47,9 @@ pub fn validate(root: &Path) -> Validation {
         plain::check(root, &mut validation);
         meta::check_card(root, &mut validation);
     }
+    if tables != ProgramTables::Own && root.join(layout::ANNOTATION).is_file() {
+        by_model::check_annotation(root, validation.episodes, &mut validation);
+    }
     if tables == ProgramTables::None {
         return validation;
     }

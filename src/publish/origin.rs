@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::annotate::{ANNOTATION, Measured};
 use crate::artifact::{IoError, read_json};
-use crate::dataset::DatasetSummary;
+use crate::dataset::{BY_MODEL, DatasetSummary};
+use crate::publish::modelled::Modelled;
 use crate::words::counted;
 
 /// Where episodes and labels are from.
@@ -18,27 +18,18 @@ pub(super) enum Origin {
     Annotated {
         /// By which column.
         column: String,
+        /// The models that the column is from, where its files tell of them.
+        models: Option<Modelled>,
     },
     /// A trained model took demonstrations apart.
     Modelled(Modelled),
-    /// A dataset of others as it is, without program tables.
+    /// A dataset as it is, without program tables.
     Foreign {
         /// Forms of labels that it has.
         labels: Vec<&'static str>,
+        /// The models that made them, where its files tell of them.
+        models: Option<Modelled>,
     },
-}
-
-/// What `ntp/annotation.json` tells of labels that models made.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(super) struct Modelled {
-    /// The models in words.
-    models: String,
-    /// The day, or nothing.
-    day: String,
-    /// How well the labels agreed with true ones.
-    measured: String,
-    /// What is told of doubtful episodes.
-    doubtful: String,
 }
 
 /// The part of `ntp/info.json` that tells.
@@ -48,74 +39,18 @@ struct Told {
     annotated_by: Option<String>,
 }
 
-/// The part of `ntp/annotation.json` that is told on.
-#[derive(Deserialize)]
-struct AnnotationTold {
-    models: Vec<ModelTold>,
-    #[serde(default)]
-    date: Option<String>,
-    #[serde(default)]
-    doubtful: Option<Vec<serde::de::IgnoredAny>>,
-    #[serde(default)]
-    measured: Option<Measured>,
-}
-
-#[derive(Deserialize)]
-struct ModelTold {
-    name: String,
-    variant: String,
-    #[serde(default)]
-    version: Option<String>,
-    /// Nothing where it is not known.
-    episodes: Option<u64>,
-}
-
-impl Modelled {
-    fn of(told: &AnnotationTold) -> Self {
-        let model = |model: &ModelTold| {
-            let version =
-                model.version.as_ref().map(|version| format!(", version `{}`", version.get(..12).unwrap_or(version)));
-            format!("`{}` (variant {}{})", model.name, model.variant, version.unwrap_or_default())
-        };
-        let models: Vec<String> = told.models.iter().filter(|of| of.episodes != Some(0)).map(model).collect();
-        Self {
-            models: models.join(" and "),
-            day: told.date.as_ref().map(|date| format!(" on {date}")).unwrap_or_default(),
-            measured: told.measured.as_ref().map_or_else(|| "Their accuracy was not measured.".to_owned(), in_words),
-            doubtful: told.doubtful.as_ref().map_or_else(String::new, |doubtful| {
-                format!("; `ntp/annotation.json` lists {} doubtful episodes with the reasons", doubtful.len())
-            }),
-        }
-    }
-}
-
-/// A measurement in a sentence.
-fn in_words(measured: &Measured) -> String {
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let subtasks = measured.levels.get("sub_task").cloned().unwrap_or_default();
-    let f1 = subtasks.boundary_f1.get("0.5").copied().unwrap_or(0.0);
-    format!(
-        "Measured against the true labels of `{}` ({}): {} of the calls have the right program and frames; of the \
-         sub-tasks {} of the frames are right, and the F1 of boundaries within 0.5 s is {f1:.3}.",
-        measured.truth,
-        counted(measured.episodes, "episode"),
-        percent(measured.call_accuracy()),
-        percent(subtasks.frame_accuracy)
-    )
-}
-
 impl Origin {
     /// That of a dataset.
     pub(super) fn of(dataset: &Path, summary: &DatasetSummary) -> Result<Self, IoError> {
+        let models = Modelled::of(dataset, summary.total_episodes)?;
         if let Some(declared) = &summary.declared {
-            return Ok(Self::Foreign { labels: declared.labels.clone() });
+            return Ok(Self::Foreign { labels: declared.labels.clone(), models });
         }
         let told: Told = read_json(&dataset.join("ntp/info.json"))?;
-        let annotation = dataset.join(ANNOTATION);
-        Ok(match told.annotated_by {
-            None => Self::Simulated,
-            Some(_) if annotation.is_file() => Self::Modelled(Modelled::of(&read_json(&annotation)?)),
-            Some(column) => Self::Annotated { column },
+        Ok(match (told.annotated_by, models) {
+            (None, _) => Self::Simulated,
+            (Some(by), Some(models)) if by == BY_MODEL => Self::Modelled(models),
+            (Some(column), models) => Self::Annotated { column, models },
         })
     }
 
@@ -135,9 +70,12 @@ impl Origin {
     /// The hub's word for who made the labels.
     pub(super) fn annotations_creators(&self) -> &'static str {
         match self {
-            Self::Simulated | Self::Modelled(_) => "machine-generated",
+            Self::Simulated
+            | Self::Modelled(_)
+            | Self::Annotated { models: Some(_), .. }
+            | Self::Foreign { models: Some(_), .. } => "machine-generated",
             Self::Annotated { .. } => "found",
-            Self::Foreign { labels } if labels.is_empty() => "no-annotation",
+            Self::Foreign { labels, .. } if labels.is_empty() => "no-annotation",
             Self::Foreign { .. } => "found",
         }
     }
@@ -159,13 +97,14 @@ impl Origin {
                     families.collect::<Vec<_>>().join(", ")
                 )
             }
-            Self::Annotated { column } => format!(
+            Self::Annotated { column, .. } => format!(
                 "{episodes} of {tasks}, with their annotated sub-tasks as a program tree \
                  of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
             ),
-            Self::Modelled(Modelled { models, .. }) => format!(
-                "{episodes} of {tasks}, taken apart by the model {models} into a \
-                 hierarchy of program calls with arguments, spans and confidences."
+            Self::Modelled(models) => format!(
+                "{episodes} of {tasks}, taken apart by the model {} into a \
+                 hierarchy of program calls with arguments, spans and confidences.",
+                models.names()
             ),
             Self::Foreign { .. } => {
                 let robot = summary.declared.as_ref().and_then(|declared| declared.robot_type.as_deref());
@@ -183,23 +122,33 @@ impl Origin {
                                 argument, on which part of the demonstration, and when it ended. None of these labels was \
                                 guessed or drawn by hand; they are the calls of the program that acted."
                 .to_owned(),
-            Self::Annotated { column } => format!(
-                "Every episode is a call of the root program `task`, and each run of frames of one sub-task is a call below \
-                 it. These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
-                 how, or how exactly."
-            ),
-            Self::Modelled(Modelled { models, day, measured, doubtful }) => format!(
-                "These labels are predictions: the model {models} made them of the demonstrations{day}. Nobody has drawn \
-                 or checked them by hand. {measured} `calls.confidence` tells how sure each call is{doubtful}."
-            ),
-            Self::Foreign { labels } if labels.is_empty() => {
+            Self::Annotated { column, models } => {
+                let from = match models {
+                    Some(models) => models.words(""),
+                    None => format!(
+                        "These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
+                         how, or how exactly."
+                    ),
+                };
+                format!(
+                    "Every episode is a call of the root program `task`, and each run of frames of one sub-task is a call \
+                     below it. {from}"
+                )
+            }
+            Self::Modelled(models) => models.words(" `calls.confidence` tells how sure each call is."),
+            Self::Foreign { labels, .. } if labels.is_empty() => {
                 "Beside the tasks in words it has no labels: frames are not told apart by what is being done.".to_owned()
             }
-            Self::Foreign { labels } => format!(
-                "It has labels below the task ({}), as they were annotated elsewhere. The files do not tell who \
-                 annotated them, how, or how exactly.",
-                labels.join(", ")
-            ),
+            Self::Foreign { labels, models } => {
+                let labels = labels.join(", ");
+                match models {
+                    Some(models) => format!("It has labels below the task ({labels}). {}", models.words("")),
+                    None => format!(
+                        "It has labels below the task ({labels}), as they were annotated elsewhere. The files do not tell \
+                         who annotated them, how, or how exactly."
+                    ),
+                }
+            }
         }
     }
 
@@ -265,23 +214,29 @@ impl Origin {
                      `ntp.time_secs`.", fps = counted(fps, "frame")),
                 "Observations are positions of slots, relative to the gripper.".to_owned(),
             ],
-            Self::Annotated { .. } => vec![
-                "The accuracy of the labels was not measured.".to_owned(),
+            Self::Annotated { models, .. } => vec![
+                match models {
+                    Some(models) => models.limit(),
+                    None => "The accuracy of the labels was not measured.".to_owned(),
+                },
                 "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
                 format!("`timestamp` is regular at {fps} a second, as LeRobot wants.", fps = counted(fps, "frame")),
             ],
-            Self::Modelled(Modelled { measured, .. }) => vec![
-                format!("The labels are a model's. {measured}"),
+            Self::Modelled(models) => vec![
+                models.limit(),
                 format!("`timestamp` is regular at {fps} a second, as LeRobot wants.", fps = counted(fps, "frame")),
                 "Observations are positions of slots, relative to the gripper.".to_owned(),
             ],
-            Self::Foreign { .. } => vec![
+            Self::Foreign { models, .. } => vec![
                 format!(
                     "`timestamp` is regular at {fps} a second, as LeRobot wants: when a sensor was read is not told.",
                     fps = counted(fps, "frame")
                 ),
                 "What its columns mean is told by their names alone.".to_owned(),
-            ],
+            ]
+            .into_iter()
+            .chain(models.as_ref().map(Modelled::limit))
+            .collect(),
         };
         let boundaries =
             "Frames between the ends of primitives are not in the tables: motions have no intermediate states.";

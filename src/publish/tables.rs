@@ -28,6 +28,17 @@ const PLAIN_SUBSETS: [(&str, &str, &str, &[&str]); 2] = [
     ("episodes", "meta/episodes/*/*.parquet", "an episode", &["episode_index"]),
 ];
 
+/// Columns that no schema of ours has, by table, with what each means.
+const FURTHER_COLUMNS: [(&str, &str, &str); 3] = [
+    ("calls", "confidence", "how sure the model is of the call: from 0, not at all, to 1"),
+    (
+        "frames",
+        "language_persistent",
+        "what the episode's plan, sub-tasks and motions are in words, and when each begins",
+    ),
+    ("frames", "language_events", "what is said at this frame"),
+];
+
 /// A column of a table.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ColumnFacts {
@@ -65,7 +76,11 @@ pub(super) fn tables(root: &Path, summary: &DatasetSummary) -> Result<Vec<TableF
         });
         let Some(first) = first else { continue };
         let known = if summary.declared.is_some() && name == "episodes" { "meta_episodes" } else { name };
-        let meaning = |column: &str| schemas.iter().find(|schema| schema.name() == known)?.meaning(column);
+        let meaning = |column: &str| {
+            let of_ours = schemas.iter().find(|schema| schema.name() == known).and_then(|of| of.meaning(column));
+            let further = || FURTHER_COLUMNS.iter().find(|(table, other, _)| (*table, *other) == (name, column));
+            of_ours.or_else(|| further().map(|(_, _, meaning)| *meaning))
+        };
         let facts = |(column, kind): (String, _)| facts(meaning(&column), column, kind);
         let columns = file_columns(first)?.into_iter().map(facts).collect();
         let rows = match name {

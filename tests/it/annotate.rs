@@ -6,16 +6,20 @@ use ntp::annotate::{AnnotateConfig, Annotation, KeyFrames, Model, annotate, meas
 use ntp::artifact::read_json;
 use ntp::dataset::edit::{Carry, Condition, diff, filter, merge};
 use ntp::dataset::export::{LabelForm, export};
+use ntp::dataset::import::import;
 use ntp::dataset::{ConvertConfig, FrameChoice, read_trials, schema, validate};
 use ntp::program::Program;
+use ntp::publish::publish;
 use ntp::rollout::{Decision, Policy, PolicyError, Query, Specification};
 use ntp::scene::SlotIndex;
+use ntp::store::Folder;
 use ntp::table;
 use ntp::task::Family;
 use ntp::trace::{Episode, ObservationRows, Prediction, ProgramCall, Span};
 use serde_json::Value;
 
 use crate::dataset::{convert_all, densify, episodes, sorting_episodes};
+use crate::publish::publication;
 
 /// Decides as the expert did, told by its episodes; what a trained model would find out by itself.
 struct Knowing {
@@ -261,6 +265,58 @@ fn labels_are_written_in_one_form_once_and_compared_with_those_of_the_same_recor
     let mut models = [Knowing::new(&episodes).boxed(Family::BlockStacking, 8)];
     let error = annotate(&path("own"), &mut models, &path("no"), &config(), None).unwrap_err().to_string();
     assert!(error.contains("meta/tasks.parquet") && !path("no").exists(), "{error}");
+}
+
+/// Written in the forms of others, published, brought in again: whose labels they are is told all along.
+#[test]
+fn labels_of_a_model_are_called_so_in_every_form_and_when_they_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let episodes = episodes();
+    annotated(&episodes, folder.path(), Knowing::new(&episodes));
+    let told = |name: &str| std::fs::read(path(name).join("ntp/annotation.json")).unwrap();
+    let said_of = |name: &str| {
+        let to = path(&format!("{name}_published"));
+        publish(&path(name), &Folder::new(&to), &publication(), || true).unwrap();
+        std::fs::read_to_string(to.join("README.md")).unwrap()
+    };
+    let said = "These labels are predictions: the model `knowing` (variant";
+    let forms = [("index", LabelForm::SubtaskIndex), ("words", LabelForm::Language), ("sarm", LabelForm::Sarm)];
+    for (name, form) in forms {
+        export(&path("new"), form, &path(name)).unwrap();
+        assert_eq!(validate(&path(name)).findings, [], "{name}");
+        assert_eq!(told(name), told("new"), "{name}");
+        let back = format!("{name}_back");
+        import(&path(name), None, &path(&back)).unwrap();
+        assert_eq!(validate(&path(&back)).findings, [], "{back}");
+        for made in [name, &back] {
+            let card = said_of(made);
+            assert!(card.contains(said) && card.contains("- machine-generated"), "{made}: {card}");
+            assert!(!card.contains("do not tell who annotated"), "{made}: {card}");
+            assert!(card.contains("Measured against the true labels of `own` (6 episodes): 100.0 %"), "{made}: {card}");
+        }
+    }
+    export(&path("new"), LabelForm::Behavior, &path("behavior")).unwrap();
+    assert_eq!(told("behavior"), told("new"));
+    let condition = Condition { episodes: vec!["0-1".parse().unwrap()], ..Condition::default() };
+    filter(&path("words"), &condition, &path("part"), Carry::Packets).unwrap();
+    assert_eq!(validate(&path("part")).findings, []);
+    let card = said_of("part");
+    assert!(card.contains("(6 episodes, of which a part is here): 100.0 %"), "{card}");
+    assert!(!card.contains("not described"), "{card}");
+    let card = said_of("new");
+    assert!(card.contains("how sure the model is of the call"), "{card}");
+    // Beside episodes that nobody is known to have annotated.
+    filter(&path("words"), &condition, &path("others"), Carry::Packets).unwrap();
+    std::fs::remove_file(path("others").join("manifest.json")).unwrap();
+    std::fs::remove_file(path("others").join("ntp/annotation.json")).unwrap();
+    merge(&[path("part"), path("others")], &path("both"), Carry::Packets).unwrap();
+    let card = said_of("both");
+    assert!(card.contains("Of 2 other episodes, the files do not tell who annotated them."), "{card}");
+    assert!(card.contains("Their accuracy was not measured."), "{card}");
+    // What is told must be true of what is there, also without tables of programs.
+    std::fs::write(path("part").join("ntp/annotation.json"), r#"{"models": []}"#).unwrap();
+    assert!(validate(&path("part")).findings.iter().any(|finding| finding.code == "annotation.value"));
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! What is told of labels that models made, carried on to what is made of them.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use crate::artifact::{IoError, read_json, write_json};
+use crate::artifact::{IoError, write_json};
 use crate::dataset::edit::target::EditSummary;
 use crate::dataset::files::annotation::{Doubt, Model, Told};
 use crate::dataset::files::layout;
@@ -16,19 +17,13 @@ const COMMON: [&str; 3] = ["date", "key_frames", "doubt_below"];
 pub(super) struct Kept {
     /// The source.
     pub(super) root: PathBuf,
-    /// Their numbers there, rising.
-    pub(super) numbers: Vec<u64>,
+    /// By their numbers there, those in what is made.
+    pub(super) numbers: BTreeMap<u64, u64>,
     /// How many there are in the source.
     pub(super) n_source: u64,
-    /// The number of the first one in what is made; the others follow it.
-    pub(super) begin: u64,
 }
 
 impl Kept {
-    fn renumbered(&self, number: u64) -> Option<u64> {
-        self.numbers.binary_search(&number).ok().map(|at| self.begin + at as u64)
-    }
-
     /// How many of a model's episodes are kept, where that is known: of several models nothing tells whose an episode is.
     fn episodes_of(&self, model: &Model, is_only: bool) -> Option<u64> {
         let kept = self.numbers.len() as u64;
@@ -45,23 +40,26 @@ impl Kept {
 pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> Result<(), IoError> {
     let mut told: Vec<(&Kept, Told)> = Vec::new();
     for kept in sources {
-        let path = kept.root.join(layout::ANNOTATION);
-        if path.is_file() {
-            told.push((kept, read_json(&path)?));
+        if let Some(of) = Told::of(&kept.root)? {
+            told.push((kept, of));
         }
     }
     let Some((_, first)) = told.first() else { return Ok(()) };
     let mut others = first.others.clone();
     let differs = |key: &str| told.iter().any(|(_, other)| other.others.get(key) != first.others.get(key));
     others.retain(|key, _| !(COMMON.contains(&key.as_str()) && differs(key)));
-    others.retain(|key, _| key != "subtasks" && !(key == "measured" && told.len() > 1));
+    others.retain(|key, _| key != "subtasks" && !(key == "measured" && sources.len() > 1));
     for (key, count) in [
         ("episodes", summary.episodes),
         ("frames", summary.frames),
         ("calls", summary.calls),
         ("scopes", summary.scopes),
     ] {
-        others.insert(key.to_owned(), json!(count));
+        // Without program tables there are no calls to count.
+        match count {
+            0 => others.remove(key),
+            _ => others.insert(key.to_owned(), json!(count)),
+        };
     }
     let carried = Told { models: models(&told), doubtful: doubtful(&told), others };
     write_json(&to.join(layout::ANNOTATION), &carried)?;
@@ -74,7 +72,7 @@ pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> R
 fn doubtful(told: &[(&Kept, Told)]) -> Option<Vec<Doubt>> {
     let mut all = Vec::new();
     for (kept, told) in told {
-        let moved = |doubt: &Doubt| Some(Doubt { episode: kept.renumbered(doubt.episode)?, ..doubt.clone() });
+        let moved = |doubt: &Doubt| Some(Doubt { episode: *kept.numbers.get(&doubt.episode)?, ..doubt.clone() });
         all.extend(told.doubtful.as_ref()?.iter().filter_map(moved));
     }
     Some(all)

@@ -21,11 +21,12 @@ mod schema;
 mod target;
 mod videos;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::dataset::edit::annotation::{self, Kept};
 use crate::dataset::edit::error::EditError;
 use crate::dataset::edit::fit::Seen;
 use crate::dataset::edit::source::{SourceDescription, describe};
@@ -71,11 +72,14 @@ pub(super) fn write(
     let splits = split_names(roots)?;
     let mut descriptions = roots.iter().map(|root| describe(root)).collect::<Result<Vec<_>, _>>()?;
     let (mut n_seen, mut seen) = (0, Seen::default());
+    let nothing = |root: &PathBuf| Kept { root: root.clone(), numbers: BTreeMap::new(), n_source: 0 };
+    let mut kept: Vec<Kept> = roots.iter().map(nothing).collect();
     for split in &splits {
-        for (root, description) in roots.iter().zip(&mut descriptions) {
+        for ((root, description), kept) in roots.iter().zip(&mut descriptions).zip(&mut kept) {
             let begin = target.n_episodes();
             let mut reading = Reading::open(root)?;
             check_like(&like, &reading, &target)?;
+            kept.n_source = reading.source.episodes.len() as u64;
             for position in 0..reading.source.episodes.len() {
                 let programs = match &mut reading.programs {
                     Some(programs) => programs.next()?,
@@ -91,6 +95,7 @@ pub(super) fn write(
                     if let Some(programs) = &programs {
                         seen.note_episode(root, &programs.row)?;
                     }
+                    kept.numbers.insert(position as u64, target.n_episodes());
                     target.append(&mut reading, position, programs.as_ref())?;
                 }
             }
@@ -105,7 +110,8 @@ pub(super) fn write(
     }
     target.leave_out(n_seen - target.n_episodes());
     let statistics = first.join(layout::STATS);
-    let summary = target.finish(Some(statistics.as_path()).filter(|_| roots.len() == 1))?;
+    let mut summary = target.finish(Some(statistics.as_path()).filter(|_| roots.len() == 1))?;
+    annotation::carry(&kept, folder, &mut summary)?;
     Ok((summary, descriptions))
 }
 

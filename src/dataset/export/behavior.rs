@@ -8,6 +8,7 @@ use crate::artifact::write_json;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
 use crate::dataset::export::labels::{Label, LabelReader, LabelledCalls, LabelledEpisode};
+use crate::dataset::files::annotation;
 
 #[derive(Serialize)]
 struct Annotation {
@@ -57,16 +58,17 @@ pub(super) fn write(root: &Path, to: &Path) -> Result<ExportSummary, EditError> 
     let mut summary = ExportSummary::default();
     for episode in LabelReader::open(root)?.1 {
         let episode = episode?;
-        let annotation = annotation(&episode);
+        let labels = of_episode(&episode);
         summary.episodes += 1;
-        summary.labels += (annotation.skill_annotation.len() + annotation.primitive_annotation.len()) as u64;
+        summary.labels += (labels.skill_annotation.len() + labels.primitive_annotation.len()) as u64;
         let file = format!("task-{:04}/episode_{:08}.json", episode.task_index, episode.row.episode_index);
-        write_json(&to.join("annotations").join(file), &annotation)?;
+        write_json(&to.join("annotations").join(file), &labels)?;
     }
+    annotation::copy(root, to)?;
     Ok(summary)
 }
 
-fn annotation(episode: &LabelledEpisode) -> Annotation {
+fn of_episode(episode: &LabelledEpisode) -> Annotation {
     let (skills, n_frames) = (episode.skills(), episode.row.n_frames);
     let primitives = episode.primitives();
     Annotation {

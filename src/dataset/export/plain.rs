@@ -13,6 +13,7 @@ use crate::artifact::{IoError, create_dir, read_json, write_json};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::ExportSummary;
+use crate::dataset::files::annotation;
 use crate::dataset::files::info::{FeatureInfo, Info, NtpInfo};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::files::stated::read_statistics;
@@ -50,6 +51,7 @@ pub(super) fn write_frames(
     for file in [layout::TASKS, layout::SUBTASKS] {
         std::fs::copy(root.join(file), to.join(file)).map_err(IoError::system("copy", root.join(file)))?;
     }
+    annotation::copy(root, to)?;
     let labels = info.total_frames;
     Ok((info, labels))
 }

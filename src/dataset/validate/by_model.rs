@@ -80,7 +80,7 @@ pub(super) fn check(root: &Path, texts: &Texts, validation: &mut Validation) -> 
 }
 
 /// What is told of the labels.
-fn check_annotation(root: &Path, n_episodes: u64, validation: &mut Validation) {
+pub(super) fn check_annotation(root: &Path, n_episodes: u64, validation: &mut Validation) {
     let path = root.join(layout::ANNOTATION);
     match read_json::<Told>(&path) {
         Err(error) => validation.error("file.unreadable", &path, String::new(), error.to_string()),
