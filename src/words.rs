@@ -1,6 +1,6 @@
 //! Numbers and paths in messages for people.
 
-use std::fmt::Display;
+use std::fmt::{Debug, Display};
 use std::path::Path;
 
 /// A number of things in words: `1 episode`, `2 episodes`, `0 entries`.
@@ -21,6 +21,11 @@ pub fn plural(thing: &str) -> String {
         _ if ends_with(&["s", "x", "ch", "sh"]) => format!("{thing}es"),
         _ => format!("{thing}s"),
     }
+}
+
+/// What is there, or that nothing is.
+pub fn or_nothing<T: Debug>(found: Option<T>) -> String {
+    found.map_or_else(|| "nothing".to_owned(), |found| format!("{found:?}"))
 }
 
 /// A word as a shell reads it back.

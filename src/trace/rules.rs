@@ -34,7 +34,7 @@ pub enum TraceError {
     NoCalls,
     #[error("call {call}: {problem}")]
     Call { call: u32, problem: CallProblem },
-    #[error("call {call}: frames {span:?} do not begin and end at boundary frames")]
+    #[error("call {call}: frames {span} do not begin and end at boundary frames")]
     OffBoundary { call: u32, span: Span },
     #[error("push {push}: {problem}")]
     Push { push: usize, problem: PushProblem },
@@ -44,7 +44,7 @@ pub enum TraceError {
 #[expect(missing_docs, reason = "the messages say what each field is")]
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PushProblem {
-    #[error("its frames {found:?} are not two or more of the episode's {frames}")]
+    #[error("its frames {found} are not two or more of the episode's {frames}")]
     Frames { found: Span, frames: usize },
     #[error("its last frame {frame} is not a boundary")]
     OffBoundary { frame: u32 },
@@ -64,7 +64,7 @@ pub enum CallProblem {
     Misnumbered { found: u32 },
     #[error("the first call must be a composite root without caller, and no other call may be without")]
     Root,
-    #[error("its span {found:?} holds no frame")]
+    #[error("its span {found} holds no frame")]
     EmptySpan { found: Span },
     #[error("its caller {caller} does not come before it")]
     CallerAfter { caller: u32 },
@@ -76,19 +76,19 @@ pub enum CallProblem {
     Step { found: u16, expected: u16 },
     #[error("its caller had already ended")]
     AfterEnd,
-    #[error("its caller's window is {caller:?}, but its input is {input:?}")]
+    #[error("its caller's window is {}, but its input is {input}", caller.map_or_else(|| "nothing".to_owned(), |of| of.to_string()))]
     InputIsNotCallersWindow { input: Span, caller: Option<Span> },
-    #[error("its output {output:?} does not lie inside its input {input:?}")]
+    #[error("its output {output} does not lie inside its input {input}")]
     OutputOutsideInput { input: Span, output: Span },
     #[error("{program} and an output span do not go together as found")]
     OutputPresence { program: Program },
     #[error("its input reaches frame {end}, but the specification has {frames}")]
     BeyondSpecification { end: u32, frames: u32 },
-    #[error("its frames {found:?} do not lie inside its caller's {caller:?}")]
+    #[error("its frames {found} do not lie inside its caller's {caller}")]
     FramesOutsideCaller { found: Span, caller: Span },
     #[error("it begins at frame {begin}, before its elder sibling returned at frame {sibling}")]
     SiblingOverlap { begin: u32, sibling: u32 },
-    #[error("{program} and argument {argument:?} do not go together")]
+    #[error("{program} and {} do not go together", argument.map_or_else(|| "no argument".to_owned(), |slot| format!("slot {} as argument", slot.0)))]
     Argument { program: Program, argument: Option<SlotIndex> },
     #[error("its argument is slot {slot}, but the scene has {slots}, counted from 0")]
     UnknownSlot { slot: u16, slots: usize },

@@ -4,6 +4,8 @@
 //!
 //! Paper, section IV, "Subsequence Selection (Scoping)".
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 /// Frames `begin..end` of a task specification or of an episode; `end` is not included.
@@ -13,6 +15,12 @@ pub struct Span {
     pub begin: u32,
     /// One past the last frame; greater than `begin`.
     pub end: u32,
+}
+
+impl fmt::Display for Span {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}..{}", self.begin, self.end)
+    }
 }
 
 impl Span {

@@ -185,13 +185,23 @@ fn plain_name(contents: &Contents, at: usize) -> EpisodeName {
     }
 }
 
+/// What a feature is.
+fn feature_words(dtype: &str, shape: &impl std::fmt::Debug) -> String {
+    format!("{dtype} {shape:?}")
+}
+
+/// Features with what each is.
+fn listed<'a>(features: impl IntoIterator<Item = (&'a String, String)>) -> String {
+    features.into_iter().map(|(name, words)| format!("{name} {words}")).collect::<Vec<_>>().join(", ")
+}
+
 fn plain_settings(before: &Contents, after: &Contents) -> Vec<String> {
     let of = |contents: &Contents| {
         let info = &contents.source.info;
         let features: BTreeMap<_, _> = info
             .features
             .iter()
-            .map(|feature| (feature.name.clone(), (feature.dtype.clone(), feature.shape.clone())))
+            .map(|feature| (&feature.name, feature_words(&feature.dtype, &feature.shape)))
             .collect();
         [
             ("fps", info.fps.to_string()),
@@ -199,7 +209,7 @@ fn plain_settings(before: &Contents, after: &Contents) -> Vec<String> {
                 "splits",
                 info.splits.iter().map(|(name, range)| format!("{name} {range:?}")).collect::<Vec<_>>().join(", "),
             ),
-            ("features", format!("{features:?}")),
+            ("features", listed(features)),
         ]
     };
     let pairs = of(before).into_iter().zip(of(after));
@@ -228,10 +238,7 @@ fn other_settings(before: &Source, after: &Source) -> Vec<String> {
             ("frames", source.ntp.frames.clone()),
             ("n_slots", format!("{}", source.ntp.n_slots)),
             ("vocabulary_hash", source.ntp.vocabulary_hash.clone()),
-            (
-                "features",
-                format!("{:?}", features.iter().map(|(name, of)| (name, of.dtype, &of.shape)).collect::<Vec<_>>()),
-            ),
+            ("features", listed(features.iter().map(|(name, of)| (name, feature_words(of.dtype.name(), &of.shape))))),
         ]
     };
     let pairs = of(before).into_iter().zip(of(after));

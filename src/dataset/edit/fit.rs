@@ -91,7 +91,7 @@ fn other_feature(first: &Source, other: &Source) -> Option<(String, String, Stri
         let features = source.info.features.0.iter();
         let text = |feature: &FeatureInfo| {
             let codec = feature.info.as_ref().map_or("", CameraInfo::codec);
-            format!("{:?} {:?} {codec}", feature.dtype, feature.shape).trim_end().to_owned()
+            format!("{} {:?} {codec}", feature.dtype.name(), feature.shape).trim_end().to_owned()
         };
         features.map(|(name, feature)| (name.clone(), text(feature))).collect()
     };

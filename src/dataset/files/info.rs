@@ -73,6 +73,23 @@ pub(crate) enum Dtype {
     Other,
 }
 
+impl Dtype {
+    /// As it stands in the file.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Float32 => "float32",
+            Self::Float64 => "float64",
+            Self::Int64 => "int64",
+            Self::Bool => "bool",
+            Self::String => "string",
+            Self::Image => "image",
+            Self::Video => "video",
+            Self::Language => "language",
+            Self::Other => "a number of another size",
+        }
+    }
+}
+
 /// What `LeRobot` wants to know of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]

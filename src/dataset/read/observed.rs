@@ -11,7 +11,7 @@ use crate::dataset::tables::frames::feature::POSITION_NAMES;
 use crate::dataset::tables::{frames, meta_episodes};
 use crate::table::batch;
 use crate::trace::{Observation, ObservationRows};
-use crate::words::counted;
+use crate::words::{counted, or_nothing};
 
 /// The feature that holds observations.
 const STATE: &str = "observation.state";
@@ -209,7 +209,7 @@ fn slot_names(state: Option<&FeatureInfo>) -> Result<Vec<String>, String> {
     let names = state.ok_or_else(|| wrong("is not declared"))?.names.clone();
     let names = names.ok_or_else(|| wrong("has no names"))?;
     let Some((slots, ["gripper.open", "gripper.closed"])) = split_gripper(&names) else {
-        return Err(wrong(&format!("ends with {:?}", names.last())));
+        return Err(wrong(&format!("ends with {}", or_nothing(names.last()))));
     };
     let slot = |of_slot: &[String]| {
         let slot = of_slot.first().and_then(|name| name.strip_suffix(".x_m"));

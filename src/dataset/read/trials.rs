@@ -132,7 +132,7 @@ fn check_is_demonstration(row: &EpisodeRow) -> Result<(), String> {
 
 fn trial(row: &EpisodeRow, frames: EpisodeFrames, calls: &[ProgramCall], width: usize) -> Result<TrialData, String> {
     let map = FrameMap::new(frames.is_boundary);
-    let span = |span: Span| map.span(span).ok_or_else(|| format!("{span:?} is not between boundary frames"));
+    let span = |span: Span| map.span(span).ok_or_else(|| format!("frames {span} are not between boundary frames"));
     let on_boundaries = |call: &ProgramCall| {
         Ok::<_, String>(ProgramCall {
             input: span(call.input)?,

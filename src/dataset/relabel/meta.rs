@@ -24,7 +24,7 @@ use crate::dataset::tables::frames::feature::FEATURES;
 use crate::dataset::tables::texts::write::write_subtasks;
 use crate::program::KnownPrograms;
 use crate::table::{BatchReader, BatchWriter, Values, WriteOptions};
-use crate::words::counted;
+use crate::words::{counted, or_nothing};
 
 /// Rows that are read at a time.
 const BATCH_ROWS: usize = 4096;
@@ -62,7 +62,13 @@ pub(super) fn write(
     let expected = (info["total_episodes"].as_u64(), info["total_frames"].as_u64());
     if expected != (Some(summary.episodes), Some(summary.frames)) {
         let found = (summary.episodes, summary.frames);
-        let problem = format!("it counts {expected:?} episodes and frames, but there are {found:?}");
+        let problem = format!(
+            "it counts {} episodes and {} frames, but there are {} and {}",
+            or_nothing(expected.0),
+            or_nothing(expected.1),
+            found.0,
+            found.1
+        );
         return Err(EditError::refused("import.rows", &root.join(layout::INFO), problem));
     }
     write_episodes(root, to, &written.episodes, &written.statistics)?;

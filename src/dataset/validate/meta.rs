@@ -71,7 +71,7 @@ fn check_info(root: &Path, info: &Info, texts: &Texts, validation: &mut Validati
             Some(found) if found.dtype != feature.dtype => {
                 error(
                     "features",
-                    format!("{:?} is declared as {:?}, not {:?}", feature.name, found.dtype, feature.dtype),
+                    format!("{:?} is declared as {}, not {}", feature.name, found.dtype.name(), feature.dtype.name()),
                 );
             }
             Some(_) => {}

@@ -7,6 +7,7 @@ use crate::dataset::tables::calls;
 use crate::dataset::tables::episodes::read::EpisodeRow;
 use crate::table::batch;
 use crate::trace::{Cause, Outcome, ProgramCall, check_calls, is_sentence, sentence};
+use crate::words::or_nothing;
 
 /// Holds the rules of the program tree.
 pub(crate) fn check_tree(row: &EpisodeRow, n_slots: usize, calls: &[ProgramCall]) -> Result<(), (u32, String)> {
@@ -53,12 +54,17 @@ pub(crate) fn check_arguments(
             let place = || format!("episode {}, call {}", row.episode_index, call.id.0);
             let (found, said) = (rows.batch.argument.get(at), rows.batch.instruction.get(at));
             if !is_sentence(said, calls, position, name) {
-                let message = format!("instruction is {said:?}, but the call is {:?}", sentence(calls, position, name));
+                let message = format!(
+                    "instruction is {}, but the call is {}",
+                    or_nothing(said),
+                    or_nothing(sentence(calls, position, name))
+                );
                 validation.error("calls.instruction", &rows.path(), place(), message);
             }
             let expected = call.argument.and_then(|slot| row.slots.get(usize::from(slot.0))).map(String::as_str);
             if found != expected {
-                let message = format!("argument is {found:?}, but its slot is named {expected:?}");
+                let message =
+                    format!("argument is {}, but its slot is named {}", or_nothing(found), or_nothing(expected));
                 validation.error("calls.argument", &rows.path(), place(), message);
             }
         }

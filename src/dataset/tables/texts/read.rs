@@ -8,6 +8,7 @@ use crate::dataset::files::finding::Validation;
 use crate::dataset::files::layout;
 use crate::dataset::tables::texts::{subtasks, tasks};
 use crate::table::{self, TableReader};
+use crate::words::or_nothing;
 
 /// Texts that frames refer to, and the range that observations should have. Empty where they could not be read.
 #[derive(Default)]
@@ -22,14 +23,18 @@ impl Texts {
     pub(crate) fn task_problem(&self, task_index: i64, expected: &str) -> Option<String> {
         let text = usize::try_from(task_index).ok().and_then(|index| self.tasks.get(index));
         let is_known = self.tasks.is_empty() || text.is_some_and(|text| text == expected);
-        (!is_known).then(|| format!("task_index {task_index} is {text:?}, but the episode's task is {expected:?}"))
+        (!is_known)
+            .then(|| format!("task_index {task_index} is {}, but the episode's task is {expected:?}", or_nothing(text)))
     }
 
     /// What is wrong with a frame's sub-task, when it should have this text, or none.
     pub(crate) fn named_subtask_problem(&self, subtask_index: i64, expected: Option<&str>) -> Option<String> {
         let text = usize::try_from(subtask_index).ok().map(|index| self.subtasks.get(index).map(String::as_str));
         let is_right = text.map_or(expected.is_none(), |text| text.is_some() && text == expected);
-        (!is_right).then(|| format!("subtask_index {subtask_index} is {text:?}, but the call is {expected:?}"))
+        (!is_right).then(|| {
+            let text = text.flatten();
+            format!("subtask_index {subtask_index} is {}, but the call is {}", or_nothing(text), or_nothing(expected))
+        })
     }
 
     /// What is wrong with a frame's sub-task.
