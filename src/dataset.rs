@@ -51,6 +51,7 @@ pub use plain::{LabelsForm, PlainError};
 pub use read::lookup::{EpisodeFacts, FrameFacts, look_up};
 pub use read::observed::{ObservedEpisode, ObservedEpisodes};
 pub use read::playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};
+pub(crate) use read::summary::predicted_by;
 pub use read::summary::{DatasetSummary, DeclaredSummary, summarize};
 pub use read::table_files::{TableFiles, table_files};
 pub use read::trial_data::{DatasetTrials, TrialData};

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::artifact::{IoError, Plan, sha256_file};
-use crate::dataset::{DatasetError, EpisodeFacts, FrameFacts, look_up};
+use crate::dataset::{DatasetError, EpisodeFacts, FrameFacts, look_up, predicted_by};
 use crate::recording::ShardReader;
 
 pub use stage::{StageLineage, stage_of};
@@ -49,6 +49,9 @@ pub struct EpisodeLineage {
     pub episode: EpisodeFacts,
     /// The episode's recording.
     pub recording: RecordingLineage,
+    /// The models that made its labels; nothing where no model did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub labels_predicted_by: Option<String>,
     /// What made the dataset, and what it was made of; `None` when the dataset does not say.
     pub dataset: Option<StageLineage>,
 }
@@ -82,7 +85,8 @@ pub fn explain_episode(
 ) -> Result<EpisodeLineage, LineageError> {
     let (episode, frame) = look_up(dataset, episode, frame)?;
     let recording = find_recording(dataset, &episode, recordings)?;
-    Ok(EpisodeLineage { frame, recording, dataset: stage_of(dataset)?, episode })
+    let labels_predicted_by = predicted_by(dataset)?;
+    Ok(EpisodeLineage { frame, recording, labels_predicted_by, dataset: stage_of(dataset)?, episode })
 }
 
 /// Says where a trained model comes from.

@@ -41,10 +41,16 @@ fn episode_text(lineage: &EpisodeLineage) -> String {
     lines.extend(lineage.frame.iter().flat_map(|frame| frame_text(frame, &lineage.episode)));
     lines.extend(facts_text(&lineage.episode, lineage.frame.is_none()));
     lines.extend(recording_text(&lineage.recording));
+    if let Some(models) = &lineage.labels_predicted_by {
+        lines.push(format!("labels: predictions of the model {models}; ntp/annotation.json tells more"));
+    }
     match &lineage.dataset {
         Some(stage) => {
             lines.push("dataset".to_owned());
             lines.extend(stage_text(stage, 1));
+        }
+        None if lineage.labels_predicted_by.is_some() => {
+            lines.push("dataset: `ntp annotate` made it of the dataset that the model was shown".to_owned());
         }
         None => lines.push("dataset: it has no plan.json, so nothing says what made it".to_owned()),
     }

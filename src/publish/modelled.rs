@@ -31,9 +31,8 @@ impl Modelled {
         let Some(told) = AnnotationTold::of(dataset)? else { return Ok(None) };
         let measured = told.others.get("measured").cloned().map(serde_json::from_value::<Measured>).transpose();
         let measured = measured.map_err(|source| IoError::Json { path: dataset.join(ANNOTATION), source })?;
-        let models: Vec<String> = told.models.iter().filter(|of| of.episodes != Some(0)).map(in_words).collect();
         Ok(Some(Self {
-            models: models.join(" and "),
+            models: told.models_in_words(),
             day: told.others.get("date").and_then(Value::as_str).map(|day| format!(" on {day}")).unwrap_or_default(),
             measured: measured.map_or_else(
                 || "Their accuracy was not measured.".to_owned(),
@@ -73,14 +72,6 @@ impl Modelled {
 /// Episodes whose labels are the models', where it is known of each.
 fn of_models(models: &[AnnotationModelTold]) -> Option<u64> {
     models.iter().map(|model| model.episodes).sum()
-}
-
-/// A model in words.
-fn in_words(model: &AnnotationModelTold) -> String {
-    let word = |key: &str| model.identity.get(key).and_then(Value::as_str);
-    let version = word("version").map(|version| format!(", version `{}`", version.get(..12).unwrap_or(version)));
-    let (name, variant) = (word("name").unwrap_or("?"), word("variant").unwrap_or("?"));
-    format!("`{name}` (variant {variant}{})", version.unwrap_or_default())
 }
 
 /// A measurement in a sentence, of a dataset that has so many episodes now.

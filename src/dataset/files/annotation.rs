@@ -35,6 +35,15 @@ pub(crate) struct Doubt {
     pub(in crate::dataset) others: Map<String, Value>,
 }
 
+impl Model {
+    fn in_words(&self) -> String {
+        let word = |key: &str| self.identity.get(key).and_then(Value::as_str);
+        let version = word("version").map(|version| format!(", version `{}`", version.get(..12).unwrap_or(version)));
+        let (name, variant) = (word("name").unwrap_or("?"), word("variant").unwrap_or("?"));
+        format!("`{name}` (variant {variant}{})", version.unwrap_or_default())
+    }
+}
+
 /// Copies the file, where it is there, to what holds the same labels of the same episodes.
 pub(in crate::dataset) fn copy(root: &Path, to: &Path) -> Result<(), IoError> {
     let (from, to) = (root.join(ANNOTATION), to.join(ANNOTATION));
@@ -50,6 +59,12 @@ impl Told {
     pub(crate) fn of(root: &Path) -> Result<Option<Self>, IoError> {
         let path = root.join(ANNOTATION);
         path.is_file().then(|| read_json(&path)).transpose()
+    }
+
+    /// The models in words, but for those that have no episode.
+    pub(crate) fn models_in_words(&self) -> String {
+        let models = self.models.iter().filter(|model| model.episodes != Some(0));
+        models.map(Model::in_words).collect::<Vec<_>>().join(" and ")
     }
 
     /// What cannot be true of a dataset of so many episodes.

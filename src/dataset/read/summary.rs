@@ -5,8 +5,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::artifact::read_json;
+use crate::artifact::{IoError, read_json};
 use crate::dataset::DatasetError;
+use crate::dataset::files::annotation::Told;
 use crate::dataset::files::info::{NtpInfo, as_whole_where_it_is};
 use crate::dataset::files::layout;
 use crate::dataset::plain::{Declared, DeclaredKind, PlainSource, has_programs};
@@ -50,6 +51,9 @@ pub struct DatasetSummary {
     pub outcomes: BTreeMap<String, u64>,
     /// Least and most frames of an episode.
     pub episode_frames: [i64; 2],
+    /// The models that made its labels; nothing where no model did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub labels_predicted_by: Option<String>,
     /// What a dataset without program tables declares.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub declared: Option<DeclaredSummary>,
@@ -97,6 +101,7 @@ pub fn summarize(root: &Path) -> Result<DatasetSummary, DatasetError> {
         actors: BTreeMap::new(),
         outcomes: BTreeMap::new(),
         episode_frames: [i64::MAX, 0],
+        labels_predicted_by: predicted_by(root)?,
         declared: None,
     };
     let mut tasks = BTreeSet::new();
@@ -111,6 +116,11 @@ pub fn summarize(root: &Path) -> Result<DatasetSummary, DatasetError> {
     }
     summary.total_tasks = tasks.len() as u64;
     Ok(summary)
+}
+
+/// The models that made the labels of a dataset, in words.
+pub(crate) fn predicted_by(root: &Path) -> Result<Option<String>, IoError> {
+    Ok(Told::of(root)?.map(|told| told.models_in_words()))
 }
 
 /// The same of a dataset without program tables: of its declarations and its rows per episode.
@@ -146,6 +156,7 @@ fn summarize_plain(source: &PlainSource) -> Result<DatasetSummary, DatasetError>
         actors: BTreeMap::new(),
         outcomes: BTreeMap::new(),
         episode_frames: [lengths().min().unwrap_or(0), lengths().max().unwrap_or(0)],
+        labels_predicted_by: predicted_by(info.root())?,
         declared: Some(declared),
     })
 }
