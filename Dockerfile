@@ -1,7 +1,8 @@
 # Images with the program: `docker build -t ntp .` has all of it, and
 # `docker build --target worker -t ntp-worker .` what a cluster's nodes need. docs/build.md tells which is for whom.
-# The C and C++ compilers are in the image of Rust.
+# The C and C++ compilers are in the image of Rust; with nasm H.264 is encoded faster, into the same bytes.
 FROM rust:1.95-bookworm AS source
+RUN apt-get update && apt-get install -y --no-install-recommends nasm && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
 COPY . .
 
