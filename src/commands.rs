@@ -91,10 +91,10 @@ fn stops_in_order(command: &Command) -> bool {
         | Command::Train(_)
         | Command::Rollout(_)
         | Command::Report(_)
+        | Command::Submit(_)
         | Command::Publish(_)
         | Command::Act(_) => true,
         Command::Items(_)
-        | Command::Submit(_)
         | Command::Status(_)
         | Command::Ingest(_)
         | Command::Annotate(_)
@@ -121,6 +121,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     }
     if matches!(error.downcast_ref(), Some(PublishError::Interrupted))
         || matches!(error.downcast_ref(), Some(DeployError::Interrupted))
+        || matches!(error.downcast_ref(), Some(ClusterError::Interrupted))
     {
         return 130;
     }
@@ -147,7 +148,7 @@ fn dispatch(command: &Command, stop: &Arc<AtomicBool>) -> anyhow::Result<Command
         Command::Rollout(args) => stages::run(&args.stage, args.device.device, Stage::Rollout, Stage::Rollout, stop),
         Command::Report(args) => stages::report(args, stop),
         Command::Items(args) => items::run(args),
-        Command::Submit(args) => cluster::submit(args),
+        Command::Submit(args) => cluster::submit(args, stop),
         Command::Status(args) => cluster::status(args),
         Command::Ingest(args) => ingest::run(args),
         Command::Annotate(args) => annotate::run(args),

@@ -285,6 +285,15 @@ fn check_colours(variant: Variant, colours: u32, n_slots: usize) -> Result<(), T
     Ok(())
 }
 
+/// Removes the checkpoints of a training that another process has ended.
+///
+/// # Errors
+///
+/// When they cannot be removed.
+pub fn clear_checkpoints(folder: &Path) -> Result<(), IoError> {
+    checkpoint::clear(&folder.join(checkpoint::FOLDER))
+}
+
 /// A training that waits for its network.
 struct Learning<'r, 'h> {
     on: ComputeDevice,

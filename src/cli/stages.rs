@@ -103,8 +103,8 @@ impl FromStr for Part {
     fn from_str(word: &str) -> Result<Self, String> {
         let numbers = word.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
         match numbers {
-            Some((part, of)) if of > 0 => Ok(Self { part, of }),
-            _ => Err("is no part; written as T/N, e.g. 0/64 to 63/64".to_owned()),
+            Some((part, of)) if part < of => Ok(Self { part, of }),
+            _ => Err("is no part; written as T/N with T from 0 and below N, e.g. 0/64 to 63/64".to_owned()),
         }
     }
 }

@@ -6,11 +6,12 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::artifact::{IoError, create_dir, read_json, sha256_file, write, write_json};
+use crate::artifact::{IoError, PARTIAL_PREFIX, create_dir, read_json, sha256_file, write, write_json};
 use crate::cluster::copies::Copies;
 use crate::cluster::script;
-use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineError, PipelineFile, RunDir, Stage};
+use crate::pipeline::{self, Item, ItemRanges, ItemState, PipelineError, PipelineFile, RunDir, Stage, Stale};
 use crate::store::{AddressError, StoreAddress, StoreError};
+use crate::words::shell_path;
 
 /// The folder in a run directory.
 pub(super) const FOLDER: &str = "submit";
@@ -86,13 +87,32 @@ pub enum ClusterError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// Another pipeline or program was handed over before.
-    #[error("{} was made with another {what}; --force hands over this one, where no task of the other is left", path.display())]
+    #[error("{} was made with another {what}; once none of its tasks is left, --force hands over this one in its place", path.display())]
     Other {
         /// The earlier submission.
         path: PathBuf,
         /// `pipeline`, `ntp` or `store`.
         what: &'static str,
     },
+    /// A part of the run was made by another plan.
+    #[error(
+        "{} was begun by another plan: {stale}; ntp run {} --out {} makes it anew, and so does --begin --force with each \
+         stage whose settings differ",
+        path.display(),
+        shell_path(pipeline),
+        shell_path(path)
+    )]
+    Stale {
+        /// The run directory.
+        path: PathBuf,
+        /// What differs.
+        stale: Stale,
+        /// The pipeline file.
+        pipeline: PathBuf,
+    },
+    /// The program was told to stop while tasks ran as processes of this machine.
+    #[error("interrupted: tasks were told to end; submitting again hands over what is left")]
+    Interrupted,
     /// Nothing was handed over.
     #[error("nothing was submitted into {}: no submit/submit.json; ntp items PIPELINE with --out RUN or --store URL lists items of any run", path.display())]
     NotSubmitted {
@@ -117,10 +137,10 @@ impl ClusterError {
     /// Whether the command is at fault, and nothing was written.
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Other { .. } => true,
+            Self::Other { .. } | Self::Stale { .. } => true,
             Self::Pipeline(error) => error.is_usage(),
             Self::Store(error) => error.is_usage(),
-            Self::Io(_) | Self::NotSubmitted { .. } | Self::NoStore(_) | Self::Template(_) => false,
+            Self::Interrupted | Self::Io(_) | Self::NotSubmitted { .. } | Self::NoStore(_) | Self::Template(_) => false,
         }
     }
 }
@@ -193,6 +213,8 @@ impl Submission {
         let folder = run.join(FOLDER);
         check_models(file)?;
         check_store(file, options)?;
+        // A store that cannot be opened is told of before anything is written.
+        options.store.as_ref().map(StoreAddress::open).transpose()?;
         let store = options.store.as_ref().map(whole_name).transpose()?;
         let copies = Copies::of(file)?;
         let (pipeline_sha256, ntp_sha256) = (copies.hash()?, sha256_file(program)?);
@@ -208,6 +230,9 @@ impl Submission {
             if before.store != store {
                 return Err(other("store"));
             }
+        }
+        if options.store.is_none() {
+            check_plans(file, run)?;
         }
         if before.is_none_or(|before| before.ntp_sha256 != ntp_sha256) {
             copy_program(program, &folder.join("ntp"))?;
@@ -233,13 +258,21 @@ pub(super) struct Chain {
     pub(super) stages: Vec<SubmittedStage>,
 }
 
+/// What was made by another plan is never joined by items, whoever hands them over.
+fn check_plans(file: &PipelineFile, run: &Path) -> Result<(), ClusterError> {
+    match pipeline::stale(file, &RunDir::new(run), Stage::Report).into_iter().next() {
+        None => Ok(()),
+        Some(stale) => Err(ClusterError::Stale { path: run.to_owned(), stale, pipeline: file.path().to_owned() }),
+    }
+}
+
 /// A model that learns from several experiments belongs to none of the chains.
 fn check_models(file: &PipelineFile) -> Result<(), PipelineError> {
     match file {
         PipelineFile::Study(study) if !study.spec.models.is_empty() => Err(PipelineError::Value {
             path: study.path.clone(),
             key: "models".to_owned(),
-            problem: "learn from several experiments, and are made by ntp run alone; allowed is none to be submitted"
+            problem: "a study with models of its own cannot be submitted: they learn from several experiments, and ntp run alone makes them"
                 .to_owned(),
         }),
         PipelineFile::Study(_) | PipelineFile::Experiment(_) => Ok(()),
@@ -323,7 +356,9 @@ fn usual_per_task(stage: Stage) -> u32 {
 fn copy_program(from: &Path, to: &Path) -> Result<(), IoError> {
     create_dir(to.parent().unwrap_or(Path::new(".")))?;
     // A task that runs the program that lies there keeps it: the name goes to another file.
-    let beside = to.with_file_name(".partial-ntp");
-    std::fs::copy(from, &beside).map_err(IoError::system("copy", from))?;
-    std::fs::rename(&beside, to).map_err(IoError::system("rename to", to))
+    let folder = to.parent().unwrap_or(Path::new("."));
+    let beside = tempfile::Builder::new().prefix(PARTIAL_PREFIX).tempfile_in(folder);
+    let beside = beside.map_err(IoError::system("create a temporary file in", folder))?.into_temp_path();
+    std::fs::copy(from, &beside).map_err(IoError::system("write a copy of this program to", &beside))?;
+    beside.persist(to).map_err(|error| IoError::system("rename to", to)(error.error))
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::artifact;
 use crate::cli::{Part, ScopeArgs, StageArgs};
-use crate::commands::{CommandOutcome, output};
+use crate::commands::{CommandOutcome, UsageError, output};
 use crate::model::ComputeDevice;
 use crate::pipeline::{self, ItemRanges, Options, PipelineFile, RunDir, Scope, Stage, StageReport, Stale, Status};
 use crate::store::StoreAddress;
@@ -29,7 +29,7 @@ pub(super) fn run(
         reports.iter().try_for_each(|report| output::print(&line(report)))?;
     }
     if args.dry_run {
-        output::note(&left(&reports));
+        output::note(&undone(&reports).unwrap_or_else(|| left(&reports)));
         return Ok(CommandOutcome::Done);
     }
     Ok(outcome(&reports))
@@ -42,7 +42,10 @@ pub(super) fn report(args: &StageArgs, stop: &Arc<AtomicBool>) -> anyhow::Result
     }
     let (dir, reports) = run_stages(args, ComputeDevice::Cpu, Stage::Report, Stage::Report, stop)?;
     if args.dry_run {
-        reports.iter().try_for_each(|report| output::print(&line(report)))?;
+        match args.json {
+            true => output::print_json(&reports)?,
+            false => reports.iter().try_for_each(|report| output::print(&line(report)))?,
+        }
         return Ok(CommandOutcome::Done);
     }
     let folder = dir.report();
@@ -98,6 +101,9 @@ fn run_stages(
         experiment: None,
         stop: Arc::clone(stop),
     };
+    if options.scope != Scope::Whole {
+        refuse_stale(args, &pipeline::stale(&file, &dir, from), from)?;
+    }
     let reports = match &file {
         PipelineFile::Experiment(pipeline) => pipeline::run(pipeline, &dir, &options)?,
         PipelineFile::Study(study) => pipeline::run_study(study, &dir, &options)?,
@@ -116,6 +122,18 @@ fn say_stale(args: &StageArgs, stale: &[Stale], from: Stage) {
         let out = out.map(|out| format!(" --out {out}")).unwrap_or_default();
         output::note(&format!("{from} takes it as it is; ntp run {pipeline}{out} makes it anew"));
     }
+}
+
+/// Refuses to do a part of a stage that reads what the pipeline file would make otherwise now: the parts that others do
+/// may read what was made anew.
+fn refuse_stale(args: &StageArgs, stale: &[Stale], from: Stage) -> Result<(), UsageError> {
+    let Some(first) = stale.first() else { return Ok(()) };
+    let (pipeline, out) = (shell_path(&args.pipeline), args.out.as_deref().map(shell_path));
+    let out = out.map(|out| format!(" --out {out}")).unwrap_or_default();
+    Err(UsageError(format!(
+        "{from} would read what is of another plan: {first}; ntp run {pipeline}{out} makes it anew, and so does --begin \
+         --force with each stage whose settings differ"
+    )))
 }
 
 fn scope(args: &ScopeArgs) -> Scope {

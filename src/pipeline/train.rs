@@ -233,6 +233,7 @@ impl Worker for Trainer<'_> {
         };
         job.context.go_on()?;
         if job.is_done(shard)? {
+            training::clear_checkpoints(job.dir.path())?;
             return Ok(None);
         }
         let summary = summary?;

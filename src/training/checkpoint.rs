@@ -7,6 +7,7 @@
 //! `checkpoint/latest.json`, which is written last and names the two with their hashes. It alone says what counts. A
 //! detector, which learns first, has its own in `checkpoint/detector/`.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use burn::module::Module;
@@ -21,7 +22,9 @@ use crate::training::learner::Learner;
 use crate::training::metrics::Metric;
 
 /// Under the model's folder.
-const FOLDER: &str = "checkpoint";
+pub(super) const FOLDER: &str = "checkpoint";
+/// How often a folder is removed in which something appears at the same time.
+const ATTEMPTS: u32 = 20;
 /// Under that, for a detector.
 const DETECTOR_FOLDER: &str = "detector";
 /// How the file of the optimizer's moments ends.
@@ -146,14 +149,7 @@ impl<'c> Checkpoints<'c> {
     /// Removes what is left once the model itself is written; what names the parts first, so that no checkpoint is ever
     /// found without them.
     pub(crate) fn clear(&self) -> Result<(), IoError> {
-        remove(&self.folder.join(DETECTOR_FOLDER).join(LATEST_FILE))?;
-        remove(&self.latest_path())?;
-        match std::fs::remove_dir_all(&self.folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(IoError::system("remove", &self.folder)(error))
-            }
-            _ => Ok(()),
-        }
+        clear(&self.folder)
     }
 
     fn latest_path(&self) -> PathBuf {
@@ -163,7 +159,7 @@ impl<'c> Checkpoints<'c> {
     fn latest<S: Stands>(&self) -> Result<Option<Latest<S>>, IoError> {
         match artifact::read_json(&self.latest_path()) {
             Ok(latest) => Ok(Some(latest)),
-            Err(IoError::System { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(IoError::System { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -193,7 +189,23 @@ pub(crate) struct Resumed<M, S> {
 
 fn remove(path: &Path) -> Result<(), IoError> {
     match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(IoError::system("remove", path)(error)),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(IoError::system("remove", path)(error)),
         _ => Ok(()),
     }
+}
+
+/// Removes a folder of checkpoints; what names the parts first. A twin on another machine may write there meanwhile: then
+/// it is tried again, and in the end left to the twin, which removes it when it ends.
+pub(super) fn clear(folder: &Path) -> Result<(), IoError> {
+    for _attempt in 0..ATTEMPTS {
+        remove(&folder.join(DETECTOR_FOLDER).join(LATEST_FILE))?;
+        remove(&folder.join(LATEST_FILE))?;
+        match std::fs::remove_dir_all(folder) {
+            Ok(()) => return Ok(()),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) if error.kind() == ErrorKind::DirectoryNotEmpty => {}
+            Err(error) => return Err(IoError::system("remove", folder)(error)),
+        }
+    }
+    Ok(())
 }

@@ -119,11 +119,13 @@ fn parts_of_every_number_of_processes_do_each_item_once() {
     for n_parts in [1, 2, 3, 5] {
         let folder = smoke::copy_to("tasks");
         let mut done = 0;
-        for part in 0..=n_parts {
+        for part in 0..n_parts {
             let reports = json("generate", folder.path(), &["--part", &format!("{part}/{n_parts}")]);
             done += reports.as_array().unwrap().iter().filter(|report| report["status"] == "shard_done").count();
         }
         assert_eq!(done, 3, "in {n_parts} parts");
+        let (code, _, stderr) = stage("generate", folder.path(), &["--part", &format!("{n_parts}/{n_parts}")]);
+        assert!(code == 2 && stderr.contains("T from 0 and below N"), "{stderr}");
         assert_eq!(stage("generate", folder.path(), &["--commit"]).0, 0);
         assert_eq!(hashes(folder.path(), &["recordings"]), hashes(smoke::whole(), &["recordings"]));
     }
@@ -169,6 +171,22 @@ fn items_of_another_plan_are_refused_by_name_and_change_nothing() {
         assert!(stderr.contains("recordings is of another plan: its setting"), "{more:?}: {stderr}");
         assert_eq!(hashes(folder.path(), &ALL), before, "{more:?}");
     }
+    // So are those of later stages, which would read what is of another plan, and the whole when it is submitted.
+    for stage in ["convert", "train", "rollout", "report"] {
+        let (code, _, stderr) = run(&[stage, &pipeline, "--out", out.as_ref(), "--items", "0"]);
+        assert_eq!(code, 2, "{stage}: {stderr}");
+        let told =
+            format!("{stage} would read what is of another plan: generate: its setting episodes changed; ntp run ");
+        assert!(stderr.contains(&told), "{stage}: {stderr}");
+    }
+    for force in [&[][..], &["--force"]] {
+        let submit = ["submit", &pipeline, "--out", out.as_ref(), "--engine", "local"];
+        let (code, _, stderr) = run(&[&submit[..], force].concat());
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains("was begun by another plan: generate: its setting episodes changed; "), "{stderr}");
+    }
+    assert_eq!(hashes(folder.path(), &ALL), before);
+    assert!(!folder.path().join("submit").exists());
     let (code, stdout, stderr) = run(&["generate", &pipeline, "--out", out.as_ref(), "--begin", "--force"]);
     assert!(code == 0 && stdout.contains("removed: 3 finished shards"), "{stdout} {stderr}");
     assert_eq!(run(&["generate", &pipeline, "--out", out.as_ref(), "--items", "0-1"]).0, 0);
@@ -365,8 +383,41 @@ fn a_submitted_run_ends_as_a_run_and_submitting_again_does_what_is_left() {
     let other = changed(folder.path(), "steps = 6", "steps = 7");
     let again = ["submit", &other, "--out", &path, "--engine", "local"];
     let (code, _, stderr) = run(&again);
-    assert!(code == 2 && stderr.contains("was made with another pipeline; --force"), "{stderr}");
+    assert!(code == 2 && stderr.contains("was made with another pipeline; once none"), "{stderr}");
     assert_eq!(run(&["status", &folder.path().to_string_lossy()]).0, 1);
+}
+
+#[test]
+fn a_submitted_run_that_is_told_to_stop_tells_its_tasks_and_is_carried_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let pipeline = changed(folder.path(), "steps = 6", "steps = 100000");
+    let words = ["submit", &pipeline, "--out", &out.to_string_lossy(), "--engine", "local"];
+    let mut child = ntp(&words).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let training = out.join("models/ntp-seed0/plan.json");
+    while !training.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was stopped");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let told = std::process::Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(told.success());
+    let ended = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.code() == Some(130) && stderr.contains("tasks were told to end"), "{stderr}");
+    let copy = out.join("submit/ntp");
+    let is_running = |process: std::path::PathBuf| std::fs::read_link(process.join("exe")).is_ok_and(|exe| exe == copy);
+    let processes = std::fs::read_dir("/proc").unwrap().flatten().map(|process| process.path());
+    assert_eq!(processes.filter(|process| is_running(process.clone())).count(), 0, "a task goes on");
+    let (code, stdout, _) = run(&["status", &out.to_string_lossy()]);
+    assert!(code == 3 && stdout.contains("train: 0 of 1 item done, 1 left: 0"), "{stdout}");
+}
+
+#[test]
+fn twins_of_a_training_leave_a_model_and_nothing_else() {
+    let folder = smoke::copy_to("convert");
+    check_all_succeed((0..3).map(|_| start("train", folder.path(), &["--items", "0"])).collect());
+    assert!(!folder.path().join("models/ntp-seed0/checkpoint").exists());
+    assert_eq!(hashes(folder.path(), &["models"]), hashes(smoke::whole(), &["models"]));
 }
 
 #[test]
