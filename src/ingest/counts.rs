@@ -23,6 +23,9 @@ pub struct IngestSummary {
     /// were recorded.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub without_stamp: BTreeMap<String, u64>,
+    /// Of topics with messages that cannot be used: when the first one came, and why it cannot.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub why_unusable: BTreeMap<String, String>,
     /// Each topic that the map names.
     pub topics: BTreeMap<String, TopicCounts>,
 }
@@ -70,7 +73,8 @@ impl IngestSummary {
             let messages = counted(*messages, "message");
             format!(
                 "{topic}: {messages}, {dropped} dropped, {repeated} repeated, {out_of_order} out of order, \
-                 {late} late, {unusable} unusable"
+                 {late} late, {unusable} unusable{}",
+                self.why_unusable.get(topic).map(|why| format!(" ({why})")).unwrap_or_default()
             )
         };
         self.topics.iter().map(line).chain(self.without_stamp.iter().map(unstamped)).collect()

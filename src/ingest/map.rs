@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer, de};
 
 use super::error::IngestError;
 use super::observe::{GRIPPER, ObservationsMap};
@@ -16,6 +16,7 @@ use crate::dataset::plain::ROW_FEATURES;
 #[serde(deny_unknown_fields)]
 pub struct Map {
     /// Rows a second.
+    #[serde(deserialize_with = "whole_rate")]
     pub(super) fps: u32,
     /// The robot's name.
     #[serde(default = "unknown")]
@@ -169,6 +170,13 @@ fn half() -> f64 {
     0.5
 }
 
+/// A rate; of others their words say what is taken.
+fn whole_rate<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    let found = toml::Value::deserialize(deserializer)?;
+    let whole = found.as_integer().and_then(|fps| u32::try_from(fps).ok());
+    whole.ok_or_else(|| de::Error::custom(format!("fps is {found}; it is a whole number from 1 to 1000")))
+}
+
 /// How far a message may be from its row unless the map says otherwise.
 pub(super) const USUAL_AGE_SECS: f64 = 1.0;
 
@@ -245,6 +253,11 @@ impl FeatureMap {
         check_secs("max_age_secs", self.max_age_secs)?;
         if self.from.is_empty() {
             return Err("from names no topic".to_owned());
+        }
+        if self.matching == Matching::Linear && matches!(self.dtype, NumberType::Int64 | NumberType::Bool) {
+            return Err(
+                "match is \"linear\", between whole numbers there is no line; allowed: last, nearest".to_owned()
+            );
         }
         Ok(())
     }

@@ -10,6 +10,7 @@ use super::episode::{Bound, Bounds};
 use super::error::IngestError;
 use super::map::{Clock, Map, Task, nanos};
 use super::observe::Observer;
+use super::picture::Reason;
 use super::probe::{self, Feature};
 use super::sample::{Content, ContentKind, Sampler};
 use super::track::{Taken, Track};
@@ -17,6 +18,7 @@ use super::value::Value;
 use crate::dataset::plain::{Cell, Picture, PlainKind, PlainWriter};
 use crate::recording::{AnyMessage, read_messages};
 use crate::video::{H264Encoder, VideoError};
+use crate::words::counted;
 
 /// The rows of all files.
 pub(super) struct Rows<'m> {
@@ -156,7 +158,7 @@ impl<'r, 'm> Reading<'r, 'm> {
         self.youngest_nanos = self.youngest_nanos.max(at);
         for used in uses {
             match (used, &decoded) {
-                (Use::Sample(number), decoded) => self.sample(number, at, decoded.as_ref().ok()),
+                (Use::Sample(number), decoded) => self.sample(number, at, decoded.as_ref(), &message.channel.topic),
                 (Use::Bounds, Ok(value)) => self.bounds.message(at, value),
                 (Use::Task, Ok(value)) => self.task_text(value),
                 (_, Err(_)) => {}
@@ -179,26 +181,26 @@ impl<'r, 'm> Reading<'r, 'm> {
         }
     }
 
-    fn sample(&mut self, number: usize, at: i64, message: Option<&Value>) {
-        if message.is_some_and(|message| self.samplers[number].is_of_others(message)) {
+    fn sample(&mut self, number: usize, at: i64, message: Result<&Value, &Reason>, topic: &str) {
+        if message.is_ok_and(|message| self.samplers[number].is_of_others(message)) {
             return;
         }
+        let secs = self.secs(at);
         let (feature, track) = &mut self.tracks[number];
         track.counts.messages += 1;
-        let taken = message.and_then(|message| self.samplers[number].take(message).ok());
-        let feature = &self.features[*feature];
-        let fits = |kind: &ContentKind| match (kind, &feature.kind) {
-            (ContentKind::Numbers(names), PlainKind::Numbers(..)) => names.len() == track.width,
-            (ContentKind::Text, PlainKind::Text) | (ContentKind::Packets, PlainKind::Video(_)) => true,
-            (ContentKind::Image(found), PlainKind::Image(size) | PlainKind::Video(size)) => found == size,
-            _ => false,
-        };
-        match taken.filter(|(_, kind)| fits(kind)) {
-            Some((content, _)) => {
+        let taken = message.map_err(Clone::clone).and_then(|message| self.samplers[number].take(message));
+        let kind = &self.features[*feature].kind;
+        let fitting = taken.and_then(|(content, of)| misfit(&of, kind, track.width).map_or(Ok(content), Err));
+        match fitting {
+            Ok(content) => {
                 track.push(at, content);
                 self.bounds.sample(at);
             }
-            None => track.counts.unusable += 1,
+            Err(reason) => {
+                track.counts.unusable += 1;
+                let why = || format!("the first at {secs:.3} s: {reason}");
+                self.summary.why_unusable.entry(topic.to_owned()).or_insert_with(why);
+            }
         }
     }
 
@@ -410,5 +412,21 @@ impl<'r, 'm> Reading<'r, 'm> {
             self.summary.topics.entry(source.topic.clone()).or_default().add(counts);
         }
         Ok(())
+    }
+}
+
+/// Why what a message gives has no place in a feature; nothing where it has. `width` numbers come from its topic.
+fn misfit(found: &ContentKind, expected: &PlainKind, width: usize) -> Option<Reason> {
+    match (found, expected) {
+        (ContentKind::Numbers(names), PlainKind::Numbers(..)) => {
+            let n = names.len();
+            (n != width).then(|| format!("it has {}, and the first message had {width}", counted(n, "number")))
+        }
+        (ContentKind::Text, PlainKind::Text) | (ContentKind::Packets, PlainKind::Video(_)) => None,
+        (ContentKind::Image(found), PlainKind::Image(size) | PlainKind::Video(size)) => {
+            let [[width, height], [of_first, high]] = [found, size];
+            (found != size).then(|| format!("it is of {width}x{height} pixels, and the first one of {of_first}x{high}"))
+        }
+        _ => Some("it is of another kind than the first message".to_owned()),
     }
 }

@@ -1,6 +1,6 @@
 //! A message as a feature takes it.
 
-use super::map::{FeatureMap, SourceMap};
+use super::map::{FeatureMap, NumberType, SourceMap};
 use super::picture::{PictureTaker, Reason, Shown, is_picture};
 use super::value::Value;
 use crate::dataset::plain::Picture;
@@ -29,12 +29,13 @@ pub(super) enum ContentKind {
 /// Takes the messages of one source.
 pub(super) struct Sampler<'m> {
     source: &'m SourceMap,
+    dtype: NumberType,
     pictures: PictureTaker,
 }
 
 impl<'m> Sampler<'m> {
     pub(super) fn new(feature: &FeatureMap, source: &'m SourceMap) -> Self {
-        Self { source, pictures: PictureTaker::new(feature.store) }
+        Self { source, dtype: feature.dtype, pictures: PictureTaker::new(feature.store) }
     }
 
     /// Whether a message is about other things alone.
@@ -65,7 +66,8 @@ impl<'m> Sampler<'m> {
                 Some(())
             }
         };
-        let problem = || format!("{:?} holds more than numbers: name one field{}", path.text(), has(&value));
+        let problem =
+            || format!("{:?} holds something that is no number; name a field of numbers{}", path.text(), has(&value));
         all.ok_or_else(problem)?;
         if numbers.is_empty() {
             return Err(format!("{:?} holds no number", path.text()));
@@ -73,6 +75,9 @@ impl<'m> Sampler<'m> {
         // No reader of datasets takes what is not a number, and no statistic has a place for it.
         if numbers.iter().any(|number| !(*number as f32).is_finite()) {
             return Err(format!("{:?} holds a number that is not finite", path.text()));
+        }
+        if let Some(number) = numbers.iter().find(|number| !is_of_type(**number, self.dtype)) {
+            return Err(format!("{:?} holds {number}, which is none of the dtype that the map asks for", path.text()));
         }
         Ok((Content::Numbers(numbers), ContentKind::Numbers(names)))
     }
@@ -90,6 +95,15 @@ impl<'m> Sampler<'m> {
             number.ok_or_else(|| format!("joint {joint:?} has no number"))
         };
         joints.iter().map(one).collect()
+    }
+}
+
+/// Whether a number is one of a type, and nothing of it would be lost.
+fn is_of_type(number: f64, dtype: NumberType) -> bool {
+    match dtype {
+        NumberType::Float32 | NumberType::Float64 => true,
+        NumberType::Int64 => number.fract() == 0.0 && number.abs() < (1_u64 << 53) as f64,
+        NumberType::Bool => number == 0.0 || number == 1.0,
     }
 }
 
