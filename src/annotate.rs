@@ -35,8 +35,8 @@ mod trees;
 
 use std::path::Path;
 
-use crate::artifact::{StagedDir, write_json};
-use crate::dataset::{ObservedEpisodes, relabel};
+use crate::artifact::{StageDir, StagedDir, write_json};
+use crate::dataset::{ObservedEpisodes, predicted_by, relabel};
 
 pub use annotation::{Annotation, AnnotationModel, Doubtful};
 pub use doubt::Doubt;
@@ -74,6 +74,14 @@ pub fn annotate(
     config: &AnnotateConfig,
     against: Option<&Path>,
 ) -> Result<Annotation, AnnotateError> {
+    StageDir::new("convert", root).check_whole()?;
+    if let Some((truth, models)) = against.and_then(|truth| Some((truth, predicted_by(truth).ok()??))) {
+        let problem = format!(
+            "its labels are predictions of the model {models}, and none that others are measured against; `ntp dataset \
+             diff` compares them"
+        );
+        return Err(AnnotateError::Truth { path: truth.to_owned(), problem });
+    }
     let episodes = ObservedEpisodes::open(root)?;
     let slots = episodes.slots().to_vec();
     let staged = StagedDir::begin(to)?;

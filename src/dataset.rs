@@ -40,7 +40,7 @@ mod validate;
 mod write;
 
 pub use config::{ActionChoice, ConvertConfig, FailedEpisodes, FrameChoice};
-pub(crate) use files::annotation::{Model as AnnotationModelTold, Told as AnnotationTold};
+pub(crate) use files::annotation::Told as AnnotationTold;
 pub use files::error::{ConvertError, DatasetError};
 pub use files::finding::{Finding, Severity, Validation};
 pub(crate) use files::info::BY_MODEL;

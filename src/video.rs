@@ -33,7 +33,7 @@ pub use gif::encode_gif;
 pub use h264::{H264Decoder, H264Encoder, is_key_frame};
 pub use jpeg::encode_jpeg;
 pub use mp4::{Mp4Reader, Mp4Sample, Mp4Writer};
-pub use picture::{decode_picture, picture_size};
+pub use picture::{decode_picture, is_picture, picture_size};
 pub use png::{Rgb, decode_png, encode_png};
 pub use remux::Mp4Remux;
 pub use seek::Mp4Pictures;

@@ -14,6 +14,10 @@ pub(super) fn run(args: &AnnotateArgs) -> anyhow::Result<CommandOutcome> {
     refuse_within(&args.dataset, &args.to)?;
     let decoder = Decoder::ALL.into_iter().find(|decoder| decoder.name() == args.decoder);
     let decoder = decoder.ok_or_else(|| UsageError(format!("unknown decoder {:?}", args.decoder)))?;
+    let twice = args.model.iter().enumerate().find(|(at, path)| args.model[..*at].contains(path));
+    if let Some((_, twice)) = twice {
+        return Err(UsageError(format!("--model {} is given twice", twice.display())).into());
+    }
     let models = args.model.iter().map(|path| Model::load(path, decoder));
     let mut models = models.collect::<Result<Vec<_>, _>>()?;
     let key_frames = match args.key_frames {

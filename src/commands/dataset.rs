@@ -93,11 +93,13 @@ fn share(part: &str) -> Result<(String, f64), UsageError> {
 }
 
 fn tell(written: &[(&Path, &EditSummary)], as_json: bool) -> anyhow::Result<CommandOutcome> {
+    let is_left = written.iter().any(|(_, of)| !of.left_behind.is_empty());
+    let outcome = if is_left { CommandOutcome::LeftOut } else { CommandOutcome::Done };
     if as_json {
         let written: Vec<_> =
             written.iter().map(|(path, summary)| json!({ "path": path, "summary": summary })).collect();
         output::print_json(&json!({ "written": written }))?;
-        return Ok(CommandOutcome::Done);
+        return Ok(outcome);
     }
     let line = |(path, of): &(&Path, &EditSummary)| {
         let left_out = if of.left_out > 0 { format!(", {} left out", of.left_out) } else { String::new() };
@@ -113,7 +115,10 @@ fn tell(written: &[(&Path, &EditSummary)], as_json: bool) -> anyhow::Result<Comm
     {
         output::note(&format!("{}: without statistics: {}", path.display(), without_statistics.join(", ")));
     }
-    Ok(CommandOutcome::Done)
+    for (path, EditSummary { left_behind, .. }) in written.iter().filter(|(_, of)| !of.left_behind.is_empty()) {
+        output::note(&format!("{}: not carried over: {}", path.display(), left_behind.join(", ")));
+    }
+    Ok(outcome)
 }
 
 fn run_diff(args: &DiffArgs) -> anyhow::Result<CommandOutcome> {

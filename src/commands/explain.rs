@@ -49,9 +49,6 @@ fn episode_text(lineage: &EpisodeLineage) -> String {
             lines.push("dataset".to_owned());
             lines.extend(stage_text(stage, 1));
         }
-        None if lineage.labels_predicted_by.is_some() => {
-            lines.push("dataset: `ntp annotate` made it of the dataset that the model was shown".to_owned());
-        }
         None => lines.push("dataset: it has no plan.json, so nothing says what made it".to_owned()),
     }
     lines.join("\n")

@@ -22,6 +22,7 @@ mod cursor;
 mod diff;
 mod error;
 mod fit;
+mod left_behind;
 mod pictures;
 mod pieces;
 mod plain;
@@ -153,7 +154,7 @@ fn write(
     roots.iter().try_for_each(|root| StageDir::new("convert", root).check_whole())?;
     let is_own = |root: &PathBuf| program_tables(root) == ProgramTables::Own;
     let n_own = roots.iter().filter(|root| is_own(root)).count();
-    let (summary, descriptions) = if n_own == roots.len() && n_own > 0 {
+    let (mut summary, descriptions) = if n_own == roots.len() && n_own > 0 {
         write_own(roots, folder, |episode| {
             is_wanted(&EpisodeWords::of_row(&episode.row), &|name| episode.calls_program(name))
         })?
@@ -171,6 +172,7 @@ fn write(
         return Err(EditError::refused("edit.vocabulary", &path.join(layout::NTP_INFO), problem));
     };
     commit(stage, &descriptions, settings, folder, &summary)?;
+    summary.left_behind = left_behind::left_behind(roots);
     Ok(summary)
 }
 

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::artifact::StagedDir;
+use crate::artifact::{StageDir, StagedDir};
 use crate::dataset::edit::EditError;
 
 pub(in crate::dataset) use plain::{copy_folder, with_columns};
@@ -72,9 +72,18 @@ pub struct ExportSummary {
 ///
 /// # Errors
 ///
-/// When there is something at `to`, or the dataset cannot be read.
+/// When there is something at `to`, or the dataset cannot be read or is not as it was made.
 pub fn export(root: &Path, form: LabelForm, to: &Path) -> Result<ExportSummary, EditError> {
+    // No label is made of a file that is not, by its hash, as it was made.
+    StageDir::new("convert", root).check_whole()?;
     if form == LabelForm::Foxglove {
+        if to.extension().is_none_or(|extension| extension != "mcap") {
+            return Err(EditError::refused(
+                "edit.destination",
+                to,
+                "it is to be an MCAP file: a name that ends in .mcap",
+            ));
+        }
         if to.exists() {
             return Err(EditError::refused(
                 "edit.destination",

@@ -23,12 +23,13 @@ mod frames;
 mod meta;
 mod rows;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::artifact::{IoError, StagedDir, read, write_json};
+use crate::artifact::{self, IoError, StageDir, StagedDir, read, write_json};
 use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
@@ -75,6 +76,8 @@ pub fn import(root: &Path, form: Option<LabelsForm>, to: &Path) -> Result<Import
     })?;
     check_version(&info)?;
     let source = PlainSource::open(root)?;
+    StageDir::new("convert", root).check_whole()?;
+    check_videos(&source)?;
     let form = check(&source, form)?;
     let tasks = in_order(&root.join(layout::TASKS), &source.tasks)?;
     let known = source.subtasks.as_ref().filter(|_| form == LabelsForm::SubtaskIndex);
@@ -106,6 +109,20 @@ pub fn import(root: &Path, form: Option<LabelsForm>, to: &Path) -> Result<Import
     annotation::copy(root, folder)?;
     staged.commit()?;
     Ok(summary)
+}
+
+/// Makes sure that every video file that an episode names is there, and is the file itself.
+fn check_videos(source: &PlainSource) -> Result<(), EditError> {
+    let mut seen = BTreeSet::new();
+    for (at, feature) in source.info.videos().enumerate() {
+        for span in source.episodes.iter().filter_map(|episode| episode.videos.get(at)?.as_ref()) {
+            let path = source.info.video_file(&feature.name, span.file);
+            if seen.insert(path.clone()) {
+                artifact::open(&path)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Copies statistics as they are, or those of them that are numbers where others are not.

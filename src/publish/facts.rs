@@ -107,7 +107,9 @@ impl Facts {
 }
 
 fn frames_words(summary: &DatasetSummary) -> &'static str {
-    if summary.frames == "boundaries" {
+    if summary.declared.is_some() {
+        ""
+    } else if summary.frames == "boundaries" {
         "one at the end of each primitive, and the first"
     } else {
         "every recorded one"

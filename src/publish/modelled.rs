@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::annotate::{ANNOTATION, Measured};
 use crate::artifact::IoError;
-use crate::dataset::{AnnotationModelTold, AnnotationTold};
+use crate::dataset::AnnotationTold;
 use crate::words::counted;
 
 /// Labels that models made.
@@ -38,7 +38,7 @@ impl Modelled {
                 || "Their accuracy was not measured.".to_owned(),
                 |measured| measured_in_words(&measured, n_episodes),
             ),
-            n_others: n_episodes.saturating_sub(of_models(&told.models).unwrap_or(n_episodes)),
+            n_others: told.episodes_of_others.len() as u64,
             n_doubtful: told.doubtful.as_ref().map(Vec::len),
         }))
     }
@@ -69,11 +69,6 @@ impl Modelled {
     }
 }
 
-/// Episodes whose labels are the models', where it is known of each.
-fn of_models(models: &[AnnotationModelTold]) -> Option<u64> {
-    models.iter().map(|model| model.episodes).sum()
-}
-
 /// A measurement in a sentence, of a dataset that has so many episodes now.
 fn measured_in_words(measured: &Measured, n_episodes: u64) -> String {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
@@ -83,8 +78,8 @@ fn measured_in_words(measured: &Measured, n_episodes: u64) -> String {
     let of_what = if n_episodes < measured.episodes { "of which a part is here" } else { "all that were compared" };
     let of_what = if n_episodes == measured.episodes { episodes } else { format!("{episodes}, {of_what}") };
     format!(
-        "Measured against the true labels of `{}` ({of_what}): {} of the calls have the right program and frames; of the \
-         sub-tasks {} of the frames are right, and the F1 of boundaries within 0.5 s is {f1:.3}.",
+        "Measured against the labels of `{}` ({of_what}): {} of its calls were found with the right program and frames; of its \
+         sub-tasks {} of the frames were right, and the F1 of boundaries within 0.5 s was {f1:.3}.",
         measured.truth,
         percent(measured.call_accuracy()),
         percent(subtasks.frame_accuracy)

@@ -98,8 +98,9 @@ impl Origin {
                 )
             }
             Self::Annotated { column, .. } => format!(
-                "{episodes} of {tasks}, with their annotated sub-tasks as a program tree \
-                 of two levels. The sub-tasks are the column {column} of the dataset that it was brought in from."
+                "{episodes} of {tasks}, with their annotated sub-tasks as a program tree. The sub-tasks are {} of the dataset \
+                 that it was brought in from.",
+                form_in_words(column)
             ),
             Self::Modelled(models) => format!(
                 "{episodes} of {tasks}, taken apart by the model {} into a \
@@ -126,8 +127,8 @@ impl Origin {
                 let from = match models {
                     Some(models) => models.words(""),
                     None => format!(
-                        "These labels are `{column}` as it was annotated elsewhere. The files do not tell who annotated it, \
-                         how, or how exactly."
+                        "These labels are {} as they were found. The files do not tell who annotated them, how, or how exactly.",
+                        form_in_words(column)
                     ),
                 };
                 format!(
@@ -144,8 +145,8 @@ impl Origin {
                 match models {
                     Some(models) => format!("It has labels below the task ({labels}). {}", models.words("")),
                     None => format!(
-                        "It has labels below the task ({labels}), as they were annotated elsewhere. The files do not tell \
-                         who annotated them, how, or how exactly."
+                        "It has labels below the task ({labels}), as they were found. The files do not tell who annotated \
+                         them, how, or how exactly."
                     ),
                 }
             }
@@ -219,7 +220,7 @@ impl Origin {
                     Some(models) => models.limit(),
                     None => "The accuracy of the labels was not measured.".to_owned(),
                 },
-                "Spans of sub-tasks share no frame, and have no levels below.".to_owned(),
+                "Spans of sub-tasks share no frame.".to_owned(),
                 format!("`timestamp` is regular at {fps} a second, as LeRobot wants.", fps = counted(fps, "frame")),
             ],
             Self::Modelled(models) => vec![
@@ -292,5 +293,15 @@ impl Origin {
             }
             Self::Foreign { .. } => "",
         }
+    }
+}
+
+/// Where labels of a form lie.
+fn form_in_words(form: &str) -> String {
+    match form {
+        "language" => "the language columns".to_owned(),
+        "sarm" => "SARM's columns of `meta/episodes`".to_owned(),
+        "behavior" => "BEHAVIOR-1K's files below `annotations/`".to_owned(),
+        column => format!("the column `{column}`"),
     }
 }

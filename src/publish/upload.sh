@@ -2,7 +2,8 @@
 # Brings this folder to the Hugging Face hub: sh upload.sh OWNER/NAME
 # Needs the hub's client (pip install huggingface_hub) and a login (hf auth login). Interrupted, the same command goes on.
 # LeRobot opens a dataset on the hub only when the repository has a tag that names the format's version.
-# With git alone: git init, git lfs install, git add, git commit, git tag v3.0, git push ORIGIN main v3.0
+# With git alone: git init, git lfs install, git add, git commit, git tag VERSION, git push ORIGIN main VERSION,
+# with VERSION the codebase_version of meta/info.json
 set -eu
 repository=${1:?"the repository is missing: sh upload.sh OWNER/NAME"}
 cd -- "$(dirname -- "$0")"

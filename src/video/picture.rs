@@ -30,6 +30,11 @@ pub fn picture_size(bytes: &[u8]) -> Result<[u32; 2], VideoError> {
     }
 }
 
+/// Whether bytes begin as a picture of any form, of which PNG and JPEG alone are decoded here.
+pub fn is_picture(bytes: &[u8]) -> bool {
+    image::guess_format(bytes).is_ok()
+}
+
 /// A picture in PNG or JPEG, of whatever colours, as red, green and blue.
 ///
 /// # Errors

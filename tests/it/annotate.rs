@@ -293,7 +293,7 @@ fn labels_of_a_model_are_called_so_in_every_form_and_when_they_come_back() {
             let card = said_of(made);
             assert!(card.contains(said) && card.contains("- machine-generated"), "{made}: {card}");
             assert!(!card.contains("do not tell who annotated"), "{made}: {card}");
-            assert!(card.contains("Measured against the true labels of `own` (6 episodes): 100.0 %"), "{made}: {card}");
+            assert!(card.contains("Measured against the labels of `own` (6 episodes): 100.0 %"), "{made}: {card}");
         }
     }
     export(&path("new"), LabelForm::Behavior, &path("behavior")).unwrap();
@@ -314,6 +314,13 @@ fn labels_of_a_model_are_called_so_in_every_form_and_when_they_come_back() {
     let card = said_of("both");
     assert!(card.contains("Of 2 other episodes, the files do not tell who annotated them."), "{card}");
     assert!(card.contains("Their accuracy was not measured."), "{card}");
+    // Of the others alone nothing is told of models, and of labels that a model made none are measured against.
+    let condition = Condition { episodes: vec!["2-3".parse().unwrap()], ..Condition::default() };
+    filter(&path("both"), &condition, &path("only_others"), Carry::Packets).unwrap();
+    assert!(!path("only_others").join("ntp").exists());
+    let mut models = [Knowing::new(&episodes).boxed(Family::BlockStacking, 8)];
+    let against = annotate(&path("own"), &mut models, &path("no"), &config(), Some(&path("new"))).unwrap_err();
+    assert!(against.to_string().contains("predictions of the model `knowing`") && !path("no").exists(), "{against}");
     // What is told must be true of what is there, also without tables of programs.
     std::fs::write(path("part").join("ntp/annotation.json"), r#"{"models": []}"#).unwrap();
     assert!(validate(&path("part")).findings.iter().any(|finding| finding.code == "annotation.value"));

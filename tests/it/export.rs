@@ -21,7 +21,8 @@ use crate::dataset::{convert_all, episodes};
 fn exported(form: LabelForm) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     convert_all(&episodes(), &ConvertConfig::default(), &folder.path().join("dataset")).unwrap();
-    let summary = export(&folder.path().join("dataset"), form, &folder.path().join("labels")).unwrap();
+    let to = folder.path().join(if form == LabelForm::Foxglove { "labels.mcap" } else { "labels" });
+    let summary = export(&folder.path().join("dataset"), form, &to).unwrap();
     assert_eq!(summary.episodes, 6);
     assert!(summary.labels > 6);
     folder
@@ -183,7 +184,7 @@ fn behavior_s_annotations_name_skills_and_their_primitives() {
 #[test]
 fn every_call_is_an_event_in_order_of_its_end() {
     let folder = exported(LabelForm::Foxglove);
-    let path = folder.path().join("labels");
+    let path = folder.path().join("labels.mcap");
     let bytes = std::fs::read(&path).unwrap();
     let messages: Vec<_> = MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
     let calls = folder.path().join("dataset/ntp/calls/chunk-000/file-000.parquet");

@@ -255,7 +255,7 @@ fn a_dataset_made_of_datasets_names_them_on_its_card() {
     assert_eq!(code, 0, "{stderr}");
     let card = text(&place, "README.md");
     assert!(card.contains("ntp dataset split dataset") && card.contains("| dataset | `"), "{card}");
-    assert!(card.contains("| 0 to 4 |"), "{card}");
+    assert!(card.contains("| 0 to 3 |"), "{card}");
 }
 
 /// Of data of others only what their files tell.
@@ -282,7 +282,7 @@ fn the_card_of_a_dataset_that_was_annotated_elsewhere_claims_nothing_of_it() {
     }
     for told in [
         "annotations_creators:\n- found\n",
-        "These labels are `subtask_index` as it was annotated elsewhere.",
+        "These labels are the column `subtask_index` as they were found.",
         "`ntp dataset import THEIRS`",
         "The accuracy of the labels was not measured.",
         "Demonstrations are taken for successes: nobody has judged them.",

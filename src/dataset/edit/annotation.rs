@@ -24,12 +24,22 @@ pub(super) struct Kept {
 }
 
 impl Kept {
+    /// Those kept whose labels no model made.
+    fn of_others(&self, told: &Option<Told>) -> Vec<u64> {
+        match told {
+            None => self.numbers.values().copied().collect(),
+            Some(told) => told.episodes_of_others.iter().filter_map(|of| self.numbers.get(of)).copied().collect(),
+        }
+    }
+
     /// How many of a model's episodes are kept, where that is known: of several models nothing tells whose an episode is.
-    fn episodes_of(&self, model: &Model, is_only: bool) -> Option<u64> {
-        let kept = self.numbers.len() as u64;
+    fn episodes_of(&self, model: &Model, told: &Told) -> Option<u64> {
+        let is_only = told.models.iter().filter(|model| model.episodes != Some(0)).count() == 1;
+        let kept =
+            self.numbers.keys().filter(|number| told.episodes_of_others.binary_search(number).is_err()).count() as u64;
         match model.episodes {
             Some(1..) if is_only => Some(kept),
-            Some(1..) if kept < self.n_source => None,
+            Some(1..) if (self.numbers.len() as u64) < self.n_source => None,
             all => all,
         }
     }
@@ -39,10 +49,15 @@ impl Kept {
 /// was measured is told of one source alone: of several together nothing was.
 pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> Result<(), IoError> {
     let mut told: Vec<(&Kept, Told)> = Vec::new();
+    let mut episodes_of_others = Vec::new();
     for kept in sources {
-        if let Some(of) = Told::of(&kept.root)? {
-            told.push((kept, of));
-        }
+        let of = Told::of(&kept.root)?;
+        episodes_of_others.extend(kept.of_others(&of));
+        told.extend(of.map(|of| (kept, of)));
+    }
+    episodes_of_others.sort_unstable();
+    if episodes_of_others.len() as u64 == summary.episodes {
+        return Ok(());
     }
     let Some((_, first)) = told.first() else { return Ok(()) };
     let mut others = first.others.clone();
@@ -61,7 +76,7 @@ pub(super) fn carry(sources: &[Kept], to: &Path, summary: &mut EditSummary) -> R
             _ => others.insert(key.to_owned(), json!(count)),
         };
     }
-    let carried = Told { models: models(&told), doubtful: doubtful(&told), others };
+    let carried = Told { models: models(&told), doubtful: doubtful(&told), episodes_of_others, others };
     write_json(&to.join(layout::ANNOTATION), &carried)?;
     summary.files.push(layout::ANNOTATION.to_owned());
     summary.files.sort_unstable();
@@ -82,9 +97,8 @@ fn doubtful(told: &[(&Kept, Told)]) -> Option<Vec<Doubt>> {
 fn models(told: &[(&Kept, Told)]) -> Vec<Model> {
     let mut all: Vec<Model> = Vec::new();
     for (kept, told) in told {
-        let is_only = told.models.iter().filter(|model| model.episodes != Some(0)).count() == 1;
         for model in &told.models {
-            let episodes = kept.episodes_of(model, is_only);
+            let episodes = kept.episodes_of(model, told);
             match all.iter_mut().find(|known| known.identity == model.identity) {
                 Some(known) => known.episodes = known.episodes.zip(episodes).map(|(a, b)| a + b),
                 None => all.push(Model { episodes, identity: model.identity.clone() }),

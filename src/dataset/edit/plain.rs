@@ -66,9 +66,10 @@ pub(super) fn write(
     let Some(first) = roots.first() else {
         return Err(EditError::refused("edit.empty", folder, "there is no dataset to make it of"));
     };
-    let like = Reading::open(first)?;
-    let mut target = PlainTarget::create(folder, &like, carry)?;
     check_apart(roots)?;
+    let like = Reading::open(first)?;
+    check_declared(&like)?;
+    let mut target = PlainTarget::create(folder, &like, carry)?;
     let splits = split_names(roots)?;
     let mut descriptions = roots.iter().map(|root| describe(root)).collect::<Result<Vec<_>, _>>()?;
     let (mut n_seen, mut seen) = (0, Seen::default());
@@ -78,6 +79,7 @@ pub(super) fn write(
         for ((root, description), kept) in roots.iter().zip(&mut descriptions).zip(&mut kept) {
             let begin = target.n_episodes();
             let mut reading = Reading::open(root)?;
+            check_declared(&reading)?;
             check_like(&like, &reading, &target)?;
             kept.n_source = reading.source.episodes.len() as u64;
             for position in 0..reading.source.episodes.len() {
@@ -141,6 +143,20 @@ fn check_apart(roots: &[PathBuf]) -> Result<(), EditError> {
         }
     }
     Ok(())
+}
+
+/// Refuses what an edit would lose: a feature of which nothing tells how much a row has, and splits that are no ranges.
+fn check_declared(reading: &Reading) -> Result<(), EditError> {
+    let info = &reading.source.info;
+    let refused = |code, problem: String| Err(EditError::refused(code, &info.root().join(layout::INFO), problem));
+    if let Some(feature) = info.features.iter().find(|feature| !feature.has_shape()) {
+        let problem = format!("shape of {:?} is {}, which is none", feature.name, feature.json["shape"]);
+        return refused("edit.features", problem);
+    }
+    match info.problems.iter().find(|problem| problem.place.starts_with("splits")) {
+        Some(of) => refused("edit.split", format!("{}: {}", of.place, of.message)),
+        None => Ok(()),
+    }
 }
 
 /// Whether a source fits to the first one.

@@ -12,6 +12,7 @@ use crate::dataset::edit::words::EpisodeWords;
 use crate::dataset::plain::{PlainSource, has_programs};
 use crate::dataset::tables::episodes::read::EpisodeRows;
 use crate::seed::Seed;
+use crate::words::counted;
 
 /// Parts that are made at most: each is a pass over the dataset.
 const MAX_PARTS: usize = 256;
@@ -83,9 +84,16 @@ pub(super) fn part_names(root: &Path, by: &SplitBy) -> Result<Vec<String>, EditE
         let problem = format!("it would have more than {MAX_PARTS} parts; filter it, or split it by shares");
         return Err(EditError::refused("edit.parts", root, problem));
     }
-    let SplitBy::Shares { parts, .. } = by else { return Ok(counts.into_keys().collect()) };
+    let SplitBy::Shares { parts, unit, .. } = by else { return Ok(counts.into_keys().collect()) };
     if let Some((name, share)) = parts.iter().find(|(name, _)| !counts.contains_key(name)) {
-        let problem = format!("part {name:?} with a share of {share} would have no episode");
+        let problem = match (unit, n_units(root, *unit)?) {
+            (Unit::Episode, n) => format!("part {name:?} with a share of {share} would have none of {n} episodes"),
+            (Unit::Task, n) => format!(
+                "part {name:?} with a share of {share} would have none of {}, which stay whole; --unit episode draws \
+                 episodes instead",
+                counted(n, "task")
+            ),
+        };
         return Err(EditError::refused("edit.parts", root, problem));
     }
     Ok(parts.iter().map(|(name, _)| name.clone()).collect())

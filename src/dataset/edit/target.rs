@@ -73,6 +73,9 @@ pub struct EditSummary {
     /// Features without statistics: nothing finite is in one of their dimensions, or their sources state none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without_statistics: Vec<String>,
+    /// Files and folders of the sources that are not in it, as labels of other forms are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_behind: Vec<String>,
     /// Every file, relative to the dataset with `/`, in order of their names.
     #[serde(skip)]
     pub files: Vec<String>,

@@ -45,9 +45,12 @@ pub(super) fn write_frames(
     copy_files(root, to, (layout::DATA, FRAMES.name()), &FrameRows::options(ntp.n_slots, action_of(&info)), change)?;
     copy_folder(&root.join(layout::VIDEOS), &to.join(layout::VIDEOS))?;
     write_info(root, to, &info, further)?;
-    let mut stats: BTreeMap<String, Value> = read_statistics(&root.join(layout::STATS))?.into_iter().collect();
-    stats.retain(|name, _| !is_ours(name));
-    write_json(&to.join(layout::STATS), &stats)?;
+    let statistics = root.join(layout::STATS);
+    if statistics.is_file() {
+        let mut stats: BTreeMap<String, Value> = read_statistics(&statistics)?.into_iter().collect();
+        stats.retain(|name, _| !is_ours(name));
+        write_json(&to.join(layout::STATS), &stats)?;
+    }
     for file in [layout::TASKS, layout::SUBTASKS] {
         std::fs::copy(root.join(file), to.join(file)).map_err(IoError::system("copy", root.join(file)))?;
     }

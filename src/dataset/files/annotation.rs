@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::artifact::{IoError, create_dir, read_json};
 use crate::dataset::files::layout::ANNOTATION;
@@ -15,6 +15,9 @@ pub(crate) struct Told {
     /// Nothing where they were not listed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) doubtful: Option<Vec<Doubt>>,
+    /// Episodes whose labels are not theirs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) episodes_of_others: Vec<u64>,
     #[serde(flatten)]
     pub(crate) others: Map<String, Value>,
 }
@@ -76,13 +79,57 @@ impl Told {
         if self.models.is_empty() {
             return Some("models: there is none; expected are those whose labels these are".to_owned());
         }
+        let word = |model: &Model, key: &str| model.identity.get(key).and_then(Value::as_str).map(ToOwned::to_owned);
+        let is_name =
+            |name: Option<String>| name.is_some_and(|name| !name.is_empty() && !name.contains(char::is_control));
+        if let Some(model) = self.models.iter().find(|of| !(is_name(word(of, "name")) && is_name(word(of, "variant"))))
+        {
+            return Some(format!("models: {} lacks name or variant", json!(model)));
+        }
+        if self.episodes_of_others.last().is_some_and(|last| *last >= n_episodes) {
+            return Some(format!("episodes_of_others: there are {n_episodes} episodes"));
+        }
+        let day = self.others.get("date").filter(|day| !day.is_null());
+        if let Some(day) = day.filter(|day| !day.as_str().is_some_and(is_day)) {
+            return Some(format!("date: it is {day}, expected a day such as \"2026-11-24\""));
+        }
         let measured = self.others.get("measured")?;
         let (calls, right) = (&measured["calls"], &measured["calls_with_span"]);
         match calls.as_u64().zip(right.as_u64()) {
-            Some((calls, right)) if right <= calls => None,
-            _ => Some(format!(
-                "measured: calls_with_span is {right} and calls {calls}; expected are whole numbers, the first no larger"
-            )),
+            Some((calls, right)) if right <= calls => {}
+            _ => {
+                return Some(format!(
+                    "measured: calls_with_span is {right} and calls {calls}; expected are whole numbers, the first no \
+                     larger"
+                ));
+            }
         }
+        if !measured["truth"].is_string() {
+            return Some(format!("measured: truth is {}, expected the name of a folder", measured["truth"]));
+        }
+        if let Some((level, share)) = wrong_share(measured) {
+            return Some(format!("measured: a figure of {level} is {share}, but a share is between 0 and 1"));
+        }
+        None
+    }
+}
+
+/// Whether a text is of the form YYYY-MM-DD.
+fn is_day(text: &str) -> bool {
+    let is_right =
+        |(at, letter): (usize, char)| if [4, 7].contains(&at) { letter == '-' } else { letter.is_ascii_digit() };
+    text.len() == 10 && text.chars().enumerate().all(is_right)
+}
+
+/// A level of what was measured with a figure that is no share, and the figure.
+fn wrong_share(measured: &Value) -> Option<(&String, &Value)> {
+    let levels = measured["levels"].as_object()?;
+    levels.iter().find_map(|(name, level)| Some((name, wrong_figure(level)?)))
+}
+
+fn wrong_figure(figures: &Value) -> Option<&Value> {
+    match figures {
+        Value::Object(several) => several.values().find_map(wrong_figure),
+        figure => (!figure.as_f64().is_some_and(|share| (0.0..=1.0).contains(&share))).then_some(figure),
     }
 }

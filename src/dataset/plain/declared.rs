@@ -97,6 +97,9 @@ const NUMBERS: [(&str, Dtype); 14] = [
 /// Those of them that every reader takes.
 const N_SAFE: usize = 4;
 
+/// The most numbers that a row can have in one feature: those of a picture of 4096x4096 pixels.
+const MOST_NUMBERS: usize = 3 << 24;
+
 /// Columns that a dataset must have.
 pub(crate) const REQUIRED: [&str; 5] = ["timestamp", "frame_index", "episode_index", "index", "task_index"];
 
@@ -110,7 +113,10 @@ impl PlainInfo {
             Some("v3.0") => PlainVersion::V3_0,
             Some("v2.1") => PlainVersion::V2_1,
             Some("v2.0") => PlainVersion::V2_0,
-            found => return Err(wrong(format!("codebase_version is {found:?}; v3.0, v2.1 and v2.0 are read"))),
+            _ => {
+                let found = &json["codebase_version"];
+                return Err(wrong(format!("codebase_version is {found}; v3.0, v2.1 and v2.0 are read")));
+            }
         };
         let fps = json["fps"].as_f64().filter(|fps| *fps > 0.0 && fps.is_finite());
         let fps = fps.ok_or_else(|| wrong(format!("fps is {}, expected a number above 0", json["fps"])))?;
@@ -119,6 +125,12 @@ impl PlainInfo {
         let mut problems = Vec::new();
         let features = declared.iter().map(|(name, feature)| Declared::read(name, feature, &mut problems)).collect();
         let splits = read_splits(&json["splits"], &mut problems);
+        for key in ["total_episodes", "total_frames", "total_tasks"] {
+            if !json[key].is_null() && json[key].as_u64().is_none() {
+                let message = format!("it is {}, expected a whole number", json[key]);
+                problems.push(Problem { code: "info.value", place: key.to_owned(), message });
+            }
+        }
         let template = |key: &str, default: &str| json[key].as_str().unwrap_or(default).to_owned();
         let [data, video] = version.templates();
         let info = Self {
@@ -266,10 +278,13 @@ impl Declared {
         }
         let sides = json["shape"].as_array().map(Vec::as_slice).unwrap_or_default();
         let side = |side: &Value| side.as_u64().and_then(|side| usize::try_from(side).ok());
-        let shape = sides.iter().map(side).collect::<Option<Vec<usize>>>().unwrap_or_default();
+        let shape = sides.iter().map(side).collect::<Option<Vec<usize>>>().filter(|shape| is_of_a_row(shape));
+        let shape = shape.unwrap_or_default();
         let is_picture = matches!(kind, DeclaredKind::Image | DeclaredKind::Video);
         if shape.is_empty() || shape.contains(&0) || (is_picture && shape.len() != 3) {
-            problem("info.features", format!("shape is {}, expected sides above 0, of pictures three", json["shape"]));
+            let found = &json["shape"];
+            let allowed = format!("sides above 0, of pictures three, and at most {MOST_NUMBERS} numbers in all");
+            problem("info.features", format!("shape is {found}, expected {allowed}"));
         }
         let declared = Self { name: name.to_owned(), dtype, kind, shape, json: json.clone() };
         if is_picture && !declared.has_three_names() {
@@ -277,6 +292,11 @@ impl Declared {
             problem("info.names", message);
         }
         declared
+    }
+
+    /// Whether its shape says how many numbers a row has; an empty one is taken for a single number.
+    pub(crate) fn has_shape(&self) -> bool {
+        !self.shape.is_empty() || self.json["shape"].as_array().is_some_and(Vec::is_empty)
     }
 
     /// Numbers of a row.
@@ -308,6 +328,12 @@ impl Declared {
     fn has_three_names(&self) -> bool {
         self.json["names"].as_array().is_some_and(|names| names.len() >= 3)
     }
+}
+
+/// Whether a row can have so many numbers.
+fn is_of_a_row(shape: &[usize]) -> bool {
+    let n_numbers = shape.iter().try_fold(1_usize, |n, &side| n.checked_mul(side));
+    n_numbers.is_some_and(|n| n <= MOST_NUMBERS)
 }
 
 /// Ranges of episodes by name; other forms than `0:50` are problems.

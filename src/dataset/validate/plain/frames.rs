@@ -121,6 +121,11 @@ impl<'s> Walk<'s> {
         let Ok(all) = BatchReader::open(path, 1) else { return };
         let is_known =
             |name: &String| self.source.info.feature(name).is_some_and(|feature| feature.kind != DeclaredKind::Video);
+        let names: Vec<&String> = all.schema().fields().iter().map(|field| field.name()).collect();
+        if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+            let message = format!("column {name:?} is there twice: readers take the one or the other");
+            validation.error("file.columns", path, String::new(), message);
+        }
         for field in all.schema().fields().iter().filter(|field| !is_known(field.name())) {
             let message = format!("column {:?} is not declared in {}", field.name(), layout::INFO);
             validation.error("file.undeclared", path, String::new(), message);

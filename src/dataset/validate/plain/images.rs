@@ -4,7 +4,7 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, BinaryArray, LargeBinaryA
 
 use crate::dataset::plain::Declared;
 use crate::dataset::validate::plain::run::Run;
-use crate::video::{decode_picture, picture_size};
+use crate::video::{decode_picture, is_picture, picture_size};
 
 /// What is wrong first, and in which row.
 pub(super) fn check_images(
@@ -22,7 +22,12 @@ pub(super) fn check_images(
             return Some(("file.null", row, "it has no picture".to_owned()));
         };
         if !is_known(bytes) {
-            continue;
+            match is_picture(bytes) {
+                true => continue,
+                false => {
+                    return Some(("pictures.decode", row, "its bytes are no picture of any known form".to_owned()));
+                }
+            }
         }
         let size = match picture_size(bytes) {
             Ok(size) => size,
