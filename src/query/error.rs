@@ -69,7 +69,10 @@ pub enum QueryError {
         tables: Vec<&'static str>,
     },
     /// Polars broke off on a statement that it should have refused.
-    #[error("the statement cannot be answered: {words}")]
+    #[error(
+        "the statement cannot be answered ({words}); where tables are crossed, columns of the one and the other are compared \
+         by = alone: write the rest over a window, or as columns of a query within"
+    )]
     Panic {
         /// What it said.
         words: String,

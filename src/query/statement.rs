@@ -132,6 +132,11 @@ impl Visitor for Check<'_> {
                 );
                 return ControlFlow::Break(Box::new(refused(&format!("{not}EXISTS"), &instead)));
             }
+            Expr::Subquery(_) => {
+                let instead = "ask for it by itself, or over a window: SELECT x FROM (SELECT x, AVG(x) OVER () AS mean \
+                               FROM t) AS t WHERE x > mean";
+                return ControlFlow::Break(Box::new(refused("a query in place of a value", instead)));
+            }
             _ => {}
         }
         ControlFlow::Continue(())
@@ -141,6 +146,9 @@ impl Visitor for Check<'_> {
 /// Why a body cannot be answered.
 fn body(body: &SetExpr) -> Option<QueryError> {
     match body {
+        SetExpr::Select(select) if select.projection.is_empty() => {
+            Some(refused("SELECT without a column", "write SELECT *, or the columns that are wanted"))
+        }
         SetExpr::Select(select) => {
             let changed = select.into.as_ref().map(|into| changes(&into.to_string()));
             changed.or_else(|| ungrouped(select))
@@ -192,6 +200,15 @@ mod tests {
         assert_eq!(given("SELECT a.x, y AS z FROM a"), r#"SELECT a.x AS "x", y AS z FROM a"#);
         assert_eq!(given("SELECT x + 1, x + 1 FROM t"), r#"SELECT x + 1 AS "x + 1", x + 1 AS "x + 1 (2)" FROM t"#);
         assert_eq!(given("SELECT * FROM t"), "SELECT * FROM t");
+    }
+
+    #[test]
+    fn a_query_in_place_of_a_value_and_a_select_of_nothing_are_refused_with_what_to_write() {
+        let refused = |sql: &str| read(sql).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused("SELECT x FROM t WHERE x > (SELECT AVG(x) FROM t)").contains("OVER () AS mean"));
+        assert!(refused("SELECT (SELECT COUNT(*) FROM t)").contains("OVER () AS mean"));
+        assert!(refused("SELECT FROM t").contains("write SELECT *"));
+        assert_eq!(refused("SELECT x FROM t WHERE x IN (SELECT y FROM u)"), "");
     }
 
     #[test]
