@@ -141,8 +141,22 @@ fn messages_are_counted_by_what_became_of_them() {
     bag.json("/joint", 1000 * MS, json!({ "velocity": [1.0] }));
     bag.json("/joint", 1000 * MS, json!({ "position": [1.0] }));
     let case = Case::new(&[bag]);
-    let counts = case.ingest(&joint_map("last")).unwrap().topics["/joint"];
+    let summary = case.ingest(&joint_map("last")).unwrap();
+    let counts = summary.topics["/joint"];
     assert_eq!((counts.messages, counts.out_of_order, counts.late, counts.unusable), (30, 1, 1, 2));
+    assert!(summary.why_unusable["/joint"].starts_with("the first at 1.000 s: it has no \"position\""), "{summary:?}");
+    // Nothing is rounded to be of another type.
+    let whole =
+        joint_map("last").replace("name = \"observation.state\"", "name = \"observation.state\"\ndtype = \"int64\"");
+    assert!(whole.contains("int64"), "{whole}");
+    let summary = case.ingest(&whole).unwrap();
+    assert_eq!(summary.topics["/joint"].unusable, 26);
+    let why = "the first at 0.040 s: \"position\" holds 0.04, which is none of the dtype that the map asks for";
+    assert_eq!(summary.why_unusable["/joint"], why);
+    let error = case.ingest(&whole.replace("\"last\"", "\"linear\"")).unwrap_err().to_string();
+    assert!(error.contains("between whole numbers there is no line"), "{error}");
+    let error = case.ingest(&joint_map("last").replace("fps = 10", "fps = 29.97")).unwrap_err().to_string();
+    assert!(error.contains("fps is 29.97; it is a whole number from 1 to 1000"), "{error}");
 }
 
 #[test]

@@ -150,7 +150,8 @@ fn check_declared(reading: &Reading) -> Result<(), EditError> {
     let info = &reading.source.info;
     let refused = |code, problem: String| Err(EditError::refused(code, &info.root().join(layout::INFO), problem));
     if let Some(feature) = info.features.iter().find(|feature| !feature.has_shape()) {
-        let problem = format!("shape of {:?} is {}, which is none", feature.name, feature.json["shape"]);
+        let (name, found, allowed) = (&feature.name, &feature.json["shape"], Declared::allowed_shape());
+        let problem = format!("shape of {name:?} is {found}, expected {allowed}");
         return refused("edit.features", problem);
     }
     match info.problems.iter().find(|problem| problem.place.starts_with("splits")) {

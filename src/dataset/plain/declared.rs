@@ -283,8 +283,7 @@ impl Declared {
         let is_picture = matches!(kind, DeclaredKind::Image | DeclaredKind::Video);
         if shape.is_empty() || shape.contains(&0) || (is_picture && shape.len() != 3) {
             let found = &json["shape"];
-            let allowed = format!("sides above 0, of pictures three, and at most {MOST_NUMBERS} numbers in all");
-            problem("info.features", format!("shape is {found}, expected {allowed}"));
+            problem("info.features", format!("shape is {found}, expected {}", Self::allowed_shape()));
         }
         let declared = Self { name: name.to_owned(), dtype, kind, shape, json: json.clone() };
         if is_picture && !declared.has_three_names() {
@@ -292,6 +291,11 @@ impl Declared {
             problem("info.names", message);
         }
         declared
+    }
+
+    /// What a shape is to be, in words.
+    pub(crate) fn allowed_shape() -> String {
+        format!("sides above 0, of pictures three, and at most {MOST_NUMBERS} numbers in all")
     }
 
     /// Whether its shape says how many numbers a row has; an empty one is taken for a single number.

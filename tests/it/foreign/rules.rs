@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Float32Array, Float64Array, Int32Array, LargeListArray, StringArray};
 use arrow::buffer::OffsetBuffer;
 use arrow::datatypes::{DataType, Field};
+use ntp::dataset::edit::{Carry, Condition, filter};
 use ntp::dataset::{Severity, play_back, summarize, validate};
 use ntp::query::{Tables, query};
 use parquet::basic::{Compression, GzipLevel};
@@ -269,6 +270,43 @@ fn what_lerobot_would_refuse_or_misread_is_a_finding() {
         let is_told = found.iter().any(|of| of.starts_with(&format!("{code} ")) && of.contains(words));
         assert!(is_told, "{code} {words}: {found:#?}");
     }
+}
+
+/// Numbers that say how much there is are held against what can be: none of them is a size of memory.
+#[test]
+fn what_is_declared_beyond_all_measure_is_found_and_never_allocated() {
+    for shape in ["[1000000000000000000]", "[1000000000]", "[4294967296, 4294967296]", "[-1]", "\"2\""] {
+        let folder = written(|mini| mini.info["features"]["action"]["shape"] = serde_json::from_str(shape).unwrap());
+        let found = found(folder.path()).join("\n");
+        assert!(found.contains("info.features") && found.contains("expected sides above 0"), "{shape}: {found}");
+        let elsewhere = tempfile::tempdir().unwrap();
+        let to = elsewhere.path().join("to");
+        let condition = Condition { min_frames: Some(1), ..Condition::default() };
+        let error = filter(folder.path(), &condition, &to, Carry::Packets).unwrap_err().to_string();
+        assert!(error.contains("shape of \"action\" is") && !to.exists(), "{shape}: {error}");
+    }
+    for total in ["-5", "1e30", "\"15\""] {
+        let folder = written(|mini| mini.info["total_frames"] = serde_json::from_str(total).unwrap());
+        let found = found(folder.path()).join("\n");
+        assert!(found.contains("total_frames") && found.contains("expected a whole number"), "{total}: {found}");
+    }
+    let folder = written(|mini| mini.info["codebase_version"] = json!("v9.9"));
+    let found = found(folder.path()).join("\n");
+    assert!(found.contains("codebase_version is \"v9.9\"; v3.0"), "{found}");
+}
+
+#[test]
+fn an_edit_names_what_it_does_not_carry_over() {
+    let folder = written(|_| {});
+    std::fs::write(folder.path().join("meta/temporal_proportions_sparse.json"), "{}").unwrap();
+    std::fs::create_dir(folder.path().join("annotations")).unwrap();
+    std::fs::write(folder.path().join(".DS_Store"), "").unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (dataset, to) = (folder.path().to_str().unwrap(), elsewhere.path().join("to"));
+    let words = ["dataset", "filter", dataset, "--episodes", "0-1", "--to", to.to_str().unwrap()];
+    let (code, _, stderr) = run(&words);
+    let told = "not carried over: annotations, meta/temporal_proportions_sparse.json";
+    assert!(code == 3 && stderr.contains(told) && !stderr.contains("DS_Store"), "{code} {stderr}");
 }
 
 #[test]
