@@ -89,8 +89,15 @@ pub trait Cell: Module + ModuleDisplay + Sync + 'static {
     /// What the first `n_calls` calls remember.
     fn first(recall: Self::Recall, n_calls: usize) -> Self::Recall;
 
-    /// One step of each call, `[B, inputs]`.
-    fn step(&self, inputs: Tensor<2>, recall: Self::Recall) -> Self::Recall;
+    /// What the inputs of all steps give to the gates, which needs no memory: one product instead of one a step.
+    ///
+    /// # Shapes
+    ///
+    /// `[B, inputs]` → `[B, gates * hidden]`
+    fn project(&self, inputs: Tensor<2>) -> Tensor<2>;
+
+    /// One step of each call, by what its inputs give to the gates.
+    fn step(&self, projected: Tensor<2>, recall: Self::Recall) -> Self::Recall;
 
     /// What it shows, `[B, hidden]`.
     fn hidden(recall: &Self::Recall) -> Tensor<2>;
@@ -106,13 +113,13 @@ impl<G: Cell> Core for Recurrent<G> {
     }
 
     fn run(&self, inputs: Tensor<2>, steps: &[usize], recall: Option<G::Recall>) -> (Tensor<2>, G::Recall) {
-        let features = self.features.forward(inputs);
+        let projected = self.cell.project(self.features.forward(inputs));
         let n_calls = steps.first().copied().unwrap_or_default();
-        let mut recall = recall.unwrap_or_else(|| self.cell.nothing(n_calls, &features.device()));
+        let mut recall = recall.unwrap_or_else(|| self.cell.nothing(n_calls, &projected.device()));
         let mut hidden = Vec::with_capacity(steps.len());
         let mut begin = 0;
         for &n_calls in steps {
-            recall = self.cell.step(features.clone().narrow(0, begin, n_calls), G::first(recall, n_calls));
+            recall = self.cell.step(projected.clone().narrow(0, begin, n_calls), G::first(recall, n_calls));
             hidden.push(G::hidden(&recall));
             begin += n_calls;
         }
@@ -169,13 +176,17 @@ impl Cell for Gru {
         recall.narrow(0, 0, n_calls)
     }
 
-    fn step(&self, inputs: Tensor<2>, recall: Tensor<2>) -> Tensor<2> {
-        let [input, recurrent] = [self.input.forward(inputs), self.recurrent.forward(recall.clone())];
+    fn project(&self, inputs: Tensor<2>) -> Tensor<2> {
+        self.input.forward(inputs)
+    }
+
+    fn step(&self, projected: Tensor<2>, recall: Tensor<2>) -> Tensor<2> {
+        let recurrent = self.recurrent.forward(recall.clone());
         let n_hidden = recall.dims()[1];
         let part = |gates: &Tensor<2>, gate: usize| gates.clone().narrow(1, gate * n_hidden, n_hidden);
-        let update = sigmoid(part(&input, 0) + part(&recurrent, 0));
-        let reset = sigmoid(part(&input, 1) + part(&recurrent, 1));
-        let new = tanh(part(&input, 2) + reset * part(&recurrent, 2));
+        let update = sigmoid(part(&projected, 0) + part(&recurrent, 0));
+        let reset = sigmoid(part(&projected, 1) + part(&recurrent, 1));
+        let new = tanh(part(&projected, 2) + reset * part(&recurrent, 2));
         new.clone() + update * (recall - new)
     }
 
@@ -226,9 +237,13 @@ impl Cell for Lstm {
         recall.map(|rows| rows.narrow(0, 0, n_calls))
     }
 
-    fn step(&self, inputs: Tensor<2>, [hidden, memory]: Self::Recall) -> Self::Recall {
+    fn project(&self, inputs: Tensor<2>) -> Tensor<2> {
+        self.input.forward(inputs)
+    }
+
+    fn step(&self, projected: Tensor<2>, [hidden, memory]: Self::Recall) -> Self::Recall {
         let n_hidden = memory.dims()[1];
-        let gates = self.input.forward(inputs) + self.recurrent.forward(hidden);
+        let gates = projected + self.recurrent.forward(hidden);
         let part = |gate: usize| gates.clone().narrow(1, gate * n_hidden, n_hidden);
         let memory = sigmoid(part(1)) * memory + sigmoid(part(0)) * tanh(part(3));
         [sigmoid(part(2)) * tanh(memory.clone()), memory]

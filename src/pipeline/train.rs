@@ -161,6 +161,9 @@ impl Unit for Model<'_> {
         if let LearnsFrom::Study(_) = self.source {
             settings["experiments"] = json!(self.spec.experiments);
         }
+        if self.spec.core() != CoreKind::Reactive {
+            settings["cell_inputs"] = json!("of all steps at once");
+        }
         let learns_calls = self.spec.core() != CoreKind::Reactive && self.spec.scoping().has_scopes();
         if learns_calls && self.spec.training(self.seed).resolved().config.recovery_states > Some(0.0) {
             settings["recovery"] = json!("within calls");

@@ -334,7 +334,8 @@ fn the_gru_computes_what_it_says() {
         linear(Tensor::from_data([[1.0_f32, -1.0, 2.0]], &device()), Some(vec![0.0, 0.0, 0.5])),
         linear(Tensor::from_data([[2.0_f32, 0.0, 3.0]], &device()), None),
     );
-    let hidden = cell.step(Tensor::from_data([[1.0_f32]], &device()), Tensor::from_data([[0.5_f32]], &device()));
+    let hidden =
+        cell.step(cell.project(Tensor::from_data([[1.0_f32]], &device())), Tensor::from_data([[0.5_f32]], &device()));
     assert_near(&values(Gru::hidden(&hidden)), &[0.558_890]);
 }
 
@@ -348,7 +349,7 @@ fn the_lstm_computes_what_it_says() {
         linear(Tensor::from_data([[1.0_f32, 0.0, -1.0, 0.5]], &device()), None),
         linear(Tensor::from_data([[0.0_f32, 2.0, 0.0, 1.0]], &device()), None),
     );
-    let [hidden, memory] = cell.step(tensor(1.0), [tensor(0.5), tensor(2.0)]);
+    let [hidden, memory] = cell.step(cell.project(tensor(1.0)), [tensor(0.5), tensor(2.0)]);
     assert_near(&[values(hidden), values(memory)].concat(), &[0.259_619, 2.018_887]);
 }
 
