@@ -48,6 +48,7 @@ pub(crate) use files::layout::ANNOTATION;
 pub use labelled::{FrameLabel, LabelledEpisode, LabelledEpisodes};
 pub use pictures::{EpisodePictures, EpisodeRows, PictureLoader, Wanted};
 pub use plain::{LabelsForm, PlainError};
+pub(crate) use read::lookup::check_has_programs;
 pub use read::lookup::{EpisodeFacts, FrameFacts, look_up};
 pub use read::observed::{ObservedEpisode, ObservedEpisodes};
 pub use read::playback::{CameraTrack, NumberTrack, Playback, TrackPictures, play_back};

@@ -19,7 +19,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::annotate::AnnotateError;
-use crate::dataset::{LabelledEpisode, LabelledEpisodes};
+use crate::dataset::{LabelledEpisode, LabelledEpisodes, check_has_programs};
 use crate::program::Program;
 use crate::scene::SlotIndex;
 use crate::trace::{ProgramCall, Span};
@@ -84,6 +84,7 @@ pub fn measure(truth: &Path, labelled: &Path) -> Result<Measured, AnnotateError>
     let name = truth.canonicalize().unwrap_or_else(|_gone| truth.to_owned());
     let name = name.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (mut all, mut levels) = (Measured::of(name), LEVELS.map(|_| Tally::default()));
+    check_has_programs(truth)?;
     let differ = |problem: String| AnnotateError::Truth { path: truth.to_owned(), problem };
     let (mut right, mut found) = (LabelledEpisodes::open(truth)?, LabelledEpisodes::open(labelled)?);
     loop {

@@ -33,6 +33,16 @@ pub(super) fn run(args: &ItemsArgs) -> anyhow::Result<CommandOutcome> {
             all.extend(items.map(|item| (is_study.then_some(pipeline.spec.name.as_str()), item)));
         }
     }
+    if args.store.is_none() {
+        let stale = pipeline::stale(&file, &run, Stage::Report);
+        stale.iter().for_each(|stale| output::note(&format!("of another plan: {stale}")));
+    }
+    if let PipelineFile::Study(study) = &file
+        && !study.spec.models.is_empty()
+    {
+        let n = counted(study.spec.models.len(), "entry");
+        output::note(&format!("without the study's own models ({n} of [[models]]), which ntp run alone makes"));
+    }
     if args.array {
         let numbers: ItemRanges = all.iter().map(|(_, item)| item.item).collect();
         output::print(&numbers.to_string())?;

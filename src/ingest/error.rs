@@ -28,7 +28,7 @@ pub enum IngestError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A file lacks a topic that the map names, or has no message of it that can be used.
-    #[error("feature {feature}: no usable message of topic {topic}{why}; topics are {}: {}", topics.join(", "), path.display())]
+    #[error("feature {feature}: no usable message of topic {topic}{why}; topics are {}: {}", if topics.is_empty() { "none".to_owned() } else { topics.join(", ") }, path.display())]
     NoTopic {
         /// Which file.
         path: PathBuf,

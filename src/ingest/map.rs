@@ -231,6 +231,9 @@ impl Map {
         {
             return Err(format!("episodes.secs is {secs}; it is above 0"));
         }
+        if matches!(&self.task, Task::Text(text) if text.trim().is_empty()) {
+            return Err("task is empty; it says what the episodes are of".to_owned());
+        }
         if features.is_empty() {
             return Err("no [[feature]] and no [observations]".to_owned());
         }

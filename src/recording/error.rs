@@ -37,7 +37,7 @@ pub enum RecordingError {
         source: Damage,
     },
     /// An MCAP file of someone else: it lacks a record that every recording has.
-    #[error("not a recording of ntp: no {record}: {}", path.display())]
+    #[error("not a recording of ntp: no {record}; `ntp ingest` makes datasets of recordings of others: {}", path.display())]
     Foreign {
         /// Which file.
         path: PathBuf,

@@ -9,6 +9,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::files::cursor::Cursor;
 use crate::dataset::files::info::NtpInfo;
 use crate::dataset::files::layout::{self, EPISODES, FilePlace};
+use crate::dataset::plain::has_programs;
 use crate::dataset::tables::calls::facts::{CallFacts, CallFactsBatch, read_call_facts};
 use crate::dataset::tables::episodes::read::{EpisodeRow, EpisodeRows};
 use crate::dataset::tables::frames;
@@ -102,10 +103,21 @@ pub fn look_up(
     episode: u64,
     frame: Option<u64>,
 ) -> Result<(EpisodeFacts, Option<FrameFacts>), DatasetError> {
+    check_has_programs(root)?;
     let found = find(root, episode)?;
     let calls = read_calls(root, &found)?;
     let frame = frame.map(|frame| find_frame(root, &found, &calls, frame)).transpose()?;
     Ok((episode_facts(found.row, calls), frame))
+}
+
+/// Refuses a dataset in which nothing tells of calls.
+pub(crate) fn check_has_programs(root: &Path) -> Result<(), DatasetError> {
+    if has_programs(root) {
+        return Ok(());
+    }
+    let problem =
+        "it has no program tables, so that nothing tells of its calls; `ntp dataset import` makes them of labels";
+    Err(DatasetError::Count { path: root.join(layout::INFO), problem: problem.to_owned() })
 }
 
 /// The calls of an episode that was found.
