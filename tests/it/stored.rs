@@ -251,7 +251,7 @@ fn a_run_in_a_store_is_submitted_and_its_directory_holds_scripts_alone() {
     assert_eq!(names.collect::<Vec<_>>(), ["submit"]);
     assert_eq!(hashes(&machines.fetched(), &ALL[..5]), hashes(smoke::whole(), &ALL[..5]));
     let (code, _, stderr) = run(&["submit", PIPELINE, "--out", &path, "--engine", "local"]);
-    assert!(code == 2 && stderr.contains("was made with another store; --force"), "{stderr}");
+    assert!(code == 2 && stderr.contains("was made with another store; once none"), "{stderr}");
 }
 
 #[test]
