@@ -262,5 +262,5 @@ fn a_decision_that_is_no_call_is_an_error_that_names_it() {
     assert_eq!(unknown, "call 1: its argument is slot 8, but the scene has 8, counted from 0");
     assert_eq!(error(Program::MoveTo, None), "call 1: move_to and no argument do not go together");
     let superfluous = error(Program::Grip, Some(SlotIndex(0)));
-    assert_eq!(superfluous, "call 1: grip and argument Some(SlotIndex(0)) do not go together");
+    assert_eq!(superfluous, "call 1: grip and slot 0 as argument do not go together");
 }
