@@ -27,6 +27,7 @@ mod guard;
 mod kind;
 pub(crate) mod kinds;
 mod pictures;
+#[cfg(feature = "query")]
 mod plain_copy;
 mod read;
 mod schema;
@@ -43,6 +44,7 @@ pub use file_types::column_types;
 pub(crate) use guard::catch_panic;
 pub use kind::{ColumnKind, Form, Value};
 pub(crate) use pictures::PictureReader;
+#[cfg(feature = "query")]
 pub(crate) use plain_copy::without_extensions;
 pub(crate) use read::read_further;
 pub use read::{TableReader, file_columns, read};
