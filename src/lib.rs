@@ -9,8 +9,10 @@
 
 pub mod arm;
 pub mod artifact;
+pub mod date;
 pub mod feature;
 pub mod geometry;
+pub mod process;
 pub mod program;
 pub mod progress;
 pub mod scene;

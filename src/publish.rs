@@ -25,7 +25,6 @@
 mod card;
 mod checksums;
 mod croissant;
-mod date;
 mod error;
 mod facts;
 mod files;
@@ -45,7 +44,6 @@ use crate::dataset::{self, Severity};
 use crate::store::Store;
 
 pub use checksums::{Difference, FileDifference, Verified, verify};
-pub use date::{Date, NoDate};
 pub use error::PublishError;
 use facts::Facts;
 use files::Moved;

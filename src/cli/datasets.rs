@@ -7,7 +7,8 @@ use clap::{Args, Subcommand};
 use crate::dataset::LabelsForm;
 use crate::dataset::edit::{Ending, EpisodeRange};
 use crate::dataset::export::LabelForm;
-use crate::publish::{Date, License, Release};
+use crate::date::Date;
+use crate::publish::{License, Release};
 use crate::store::StoreAddress;
 use crate::task::Family;
 

@@ -1,7 +1,7 @@
 //! `ntp submit PIPELINE --out RUN` and `ntp status RUN`.
 
-use std::process::{Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::process::{Command, Stdio};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -10,15 +10,11 @@ use crate::cli::{StatusArgs, SubmitArgs};
 use crate::cluster::{self, ClusterError, FailedItem, StageStatus, Submission, SubmitOptions, SubmittedStage};
 use crate::commands::{CommandOutcome, output};
 use crate::pipeline::{ItemRanges, PipelineFile};
+use crate::process;
 use crate::words::{counted, shell_path};
 
 /// How often a run is looked at with `--watch`.
 const LOOK_AGAIN: Duration = Duration::from_secs(2);
-
-/// How often it is looked whether a script has ended.
-const LOOK_FOR_END: Duration = Duration::from_millis(50);
-/// How often it is looked whether tasks that were told to end have ended: for 15 seconds.
-const LOOKS: u32 = 300;
 
 /// Writes what is left into the run directory, and hands it over.
 pub(super) fn submit(args: &SubmitArgs, stop: &AtomicBool) -> anyhow::Result<CommandOutcome> {
@@ -44,57 +40,13 @@ pub(super) fn submit(args: &SubmitArgs, stop: &AtomicBool) -> anyhow::Result<Com
     let mut script = Command::new("bash");
     // Results are on stdout; what the script says is for people.
     script.arg(&submission.script).stdin(Stdio::null()).stdout(std::io::stderr());
-    let ended =
-        run_script(&mut script, stop).with_context(|| format!("failed to run {}", submission.script.display()))?;
+    let ended = process::run_in_group(&mut script, stop);
+    let ended = ended.with_context(|| format!("failed to run {}", submission.script.display()))?;
     let Some(ended) = ended else {
         return Err(ClusterError::Interrupted.into());
     };
     anyhow::ensure!(ended.success(), "{} ended with {ended}", submission.script.display());
     Ok(CommandOutcome::Done)
-}
-
-/// Runs a script to its end, in a group of processes of its own. When this program is told to stop so is the group, and
-/// nothing is returned.
-fn run_script(script: &mut Command, stop: &AtomicBool) -> std::io::Result<Option<ExitStatus>> {
-    let mut child = in_group(script).spawn()?;
-    loop {
-        if let Some(ended) = child.try_wait()? {
-            return Ok(Some(ended));
-        }
-        if stop.load(Ordering::Relaxed) {
-            break;
-        }
-        std::thread::sleep(LOOK_FOR_END);
-    }
-    signal_group("TERM", child.id());
-    child.wait()?;
-    // Tasks keep what is done before they end.
-    for _look in 0..LOOKS {
-        if !signal_group("0", child.id()) {
-            break;
-        }
-        std::thread::sleep(LOOK_FOR_END);
-    }
-    Ok(None)
-}
-
-#[cfg(unix)]
-fn in_group(command: &mut Command) -> &mut Command {
-    use std::os::unix::process::CommandExt as _;
-    command.process_group(0)
-}
-
-#[cfg(not(unix))]
-fn in_group(command: &mut Command) -> &mut Command {
-    command
-}
-
-/// Sends a signal to a group of processes; whether there is one. Signal 0 only asks.
-fn signal_group(signal: &str, leader: u32) -> bool {
-    let group = leader.to_string();
-    let mut shell = Command::new("sh");
-    shell.args(["-c", "kill -s \"$0\" -- \"-$1\"", signal, &group]).stderr(Stdio::null());
-    shell.status().is_ok_and(|status| status.success())
 }
 
 fn in_words(submission: &Submission) -> String {

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::publish::{Date, License};
+use crate::date::Date;
+use crate::publish::License;
 
 /// What only the publisher can say.
 #[derive(Clone, Debug, PartialEq, Eq)]

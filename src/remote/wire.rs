@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
+use crate::process;
 use crate::remote::error::LinkProblem;
 
 /// The longest line of either side.
@@ -162,7 +163,8 @@ struct Process {
 
 impl Process {
     fn start(command: &str, stop: Arc<AtomicBool>) -> std::io::Result<Self> {
-        let mut child = shell(command).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let mut shell = shell(command);
+        let mut child = process::in_group(&mut shell).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let missing = || std::io::Error::other("it has no standard streams");
         let input = child.stdin.take().ok_or_else(missing)?;
         let output = child.stdout.take().ok_or_else(missing)?;
@@ -170,12 +172,10 @@ impl Process {
     }
 }
 
-/// In a group of its own, so that Ctrl-C reaches it as our `stop` alone.
 #[cfg(unix)]
 fn shell(command: &str) -> Command {
-    use std::os::unix::process::CommandExt as _;
     let mut shell = Command::new("sh");
-    shell.args(["-c", command]).process_group(0);
+    shell.args(["-c", command]);
     shell
 }
 
@@ -205,20 +205,11 @@ impl Drop for Process {
             }
             std::thread::sleep(GLANCE);
         }
-        kill_group(&self.child);
+        // Also what the shell has started: a robot that hangs must not outlive us.
+        process::signal_group("KILL", self.child.id());
         let _gone = self.child.kill().and_then(|()| self.child.wait());
     }
 }
-
-/// Ends what the shell has started too: a robot that hangs must not outlive us.
-#[cfg(unix)]
-fn kill_group(leader: &Child) {
-    let group = leader.id().to_string();
-    let _gone = Command::new("sh").args(["-c", "kill -s KILL -- \"-$0\"", &group]).stderr(Stdio::null()).status();
-}
-
-#[cfg(not(unix))]
-fn kill_group(_leader: &Child) {}
 
 /// A robot that listens.
 struct Tcp {

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 /// types; `task` names no later module.
 const ORDER: &[&str] = &[
     "words",
+    "date",
+    "process",
     "feature",
     "geometry",
     "seed",

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use ntp::dataset::{ConvertConfig, schema};
-use ntp::publish::{Date, Difference, License, Publication, PublishError, PublishSummary, publish, verify};
+use ntp::date::Date;
+use ntp::publish::{Difference, License, Publication, PublishError, PublishSummary, publish, verify};
 use ntp::store::Folder;
 use serde_json::Value;
 

@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::artifact::{IoError, create_dir, read_json};
 use crate::dataset::files::layout::ANNOTATION;
+use crate::date::Date;
 
 /// What `ntp/annotation.json` tells: what changes by name, the rest as it is.
 #[derive(Clone, Deserialize, Serialize)]
@@ -90,7 +91,7 @@ impl Told {
             return Some(format!("episodes_of_others: there are {n_episodes} episodes"));
         }
         let day = self.others.get("date").filter(|day| !day.is_null());
-        if let Some(day) = day.filter(|day| !day.as_str().is_some_and(is_day)) {
+        if let Some(day) = day.filter(|day| day.as_str().is_none_or(|day| day.parse::<Date>().is_err())) {
             return Some(format!("date: it is {day}, expected a day such as \"2026-11-24\""));
         }
         let measured = self.others.get("measured")?;
@@ -112,13 +113,6 @@ impl Told {
         }
         None
     }
-}
-
-/// Whether a text is of the form YYYY-MM-DD.
-fn is_day(text: &str) -> bool {
-    let is_right =
-        |(at, letter): (usize, char)| if [4, 7].contains(&at) { letter == '-' } else { letter.is_ascii_digit() };
-    text.len() == 10 && text.chars().enumerate().all(is_right)
 }
 
 /// A level of what was measured with a figure that is no share, and the figure.

@@ -1,4 +1,4 @@
-//! The day of publication. It is always told: no clock reaches a file.
+//! A day, as people write it. It is always told: no clock reaches a file.
 
 use std::fmt;
 use std::str::FromStr;
