@@ -75,7 +75,9 @@ pub fn annotate(
     against: Option<&Path>,
 ) -> Result<Annotation, AnnotateError> {
     StageDir::new("convert", root).check_whole()?;
-    if let Some((truth, models)) = against.and_then(|truth| Some((truth, predicted_by(truth).ok()??))) {
+    if let Some(truth) = against
+        && let Some(models) = predicted_by(truth)?
+    {
         let problem = format!(
             "its labels are predictions of the model {models}, and none that others are measured against; `ntp dataset \
              diff` compares them"

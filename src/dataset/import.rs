@@ -34,13 +34,12 @@ use crate::dataset::DatasetError;
 use crate::dataset::edit::EditError;
 use crate::dataset::export::copy_folder;
 use crate::dataset::files::annotation;
-use crate::dataset::files::info::{LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::files::info::{LEROBOT_VERSION, NTP_VERSION, NtpInfo, counts_problem};
 use crate::dataset::files::layout;
 use crate::dataset::files::stated::{is_of_numbers, read_statistics};
 use crate::dataset::plain::{DeclaredKind, LabelsForm, PlainInfo, PlainLabels, PlainSource, PlainTexts};
 use crate::dataset::tables::annotated::vocabulary;
 use crate::dataset::tables::texts::write::{write_subtasks, write_tasks};
-use crate::words::or_nothing;
 
 use frames::write_frames;
 use meta::write_meta;
@@ -188,13 +187,7 @@ fn check_totals(source: &PlainSource, summary: ImportSummary) -> Result<(), Edit
     let expected = (info.total("total_episodes"), info.total("total_frames"));
     let found = (summary.episodes, summary.frames);
     if expected.0.is_some_and(|n| n != found.0) || expected.1.is_some_and(|n| n != found.1) {
-        let problem = format!(
-            "it counts {} episodes and {} frames, but there are {} and {}",
-            or_nothing(expected.0),
-            or_nothing(expected.1),
-            found.0,
-            found.1
-        );
+        let problem = counts_problem(expected.into(), found.into());
         return Err(EditError::refused("import.rows", &info.root().join(layout::INFO), problem));
     }
     Ok(())

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 /// What edits carry over or make anew, and what only told of the dataset as it was.
-const KNOWN: [&str; 16] = [
+const KNOWN: [&str; 15] = [
     "data",
     "meta",
     "videos",
-    "images",
     "ntp",
     "manifest.json",
     "plan.json",
@@ -49,7 +48,12 @@ pub(super) fn left_behind(roots: &[PathBuf]) -> Vec<String> {
 }
 
 fn unknown(folder: &Path, known: &[&str]) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| !is_empty(&entry.path()));
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     names.filter(|name| !name.starts_with('.') && !known.contains(&name.as_str())).collect()
+}
+
+/// Whether it is a folder with nothing in it, as recorders leave `images/` behind.
+fn is_empty(path: &Path) -> bool {
+    std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }

@@ -6,6 +6,7 @@ use serde::ser::SerializeMap as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::dataset::files::layout::CHUNK_FILES;
+use crate::words::or_nothing;
 
 /// The format that `meta/` and `data/` follow.
 pub(crate) const LEROBOT_VERSION: &str = "v3.0";
@@ -71,6 +72,12 @@ pub(crate) enum Dtype {
     /// Of others: numbers of other sizes.
     #[serde(other)]
     Other,
+}
+
+/// What is wrong where `meta/info.json` counts other episodes and frames than there are.
+pub(crate) fn counts_problem(counted: [Option<u64>; 2], there_are: [u64; 2]) -> String {
+    let ([episodes, frames], [n_episodes, n_frames]) = (counted.map(or_nothing), there_are);
+    format!("it counts {episodes} episodes and {frames} frames, but there are {n_episodes} and {n_frames}")
 }
 
 impl Dtype {

@@ -37,9 +37,9 @@ pub(crate) fn program_tables(root: &Path) -> ProgramTables {
 
 /// Whether there is more than the word of who made labels, which datasets without tables have too.
 fn has_tables(root: &Path) -> bool {
-    let Some(folder) = Path::new(layout::ANNOTATION).parent() else { return false };
-    let Ok(mut entries) = std::fs::read_dir(root.join(folder)) else { return false };
-    entries.any(|entry| entry.is_ok_and(|entry| !Path::new(layout::ANNOTATION).ends_with(entry.file_name())))
+    let told = root.join(layout::ANNOTATION);
+    let entries = told.parent().and_then(|folder| std::fs::read_dir(folder).ok());
+    entries.into_iter().flatten().any(|entry| entry.is_ok_and(|entry| entry.path() != told))
 }
 
 /// Whether a dataset has tables of programs.

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::artifact::{IoError, read_json, write_json};
 use crate::dataset::edit::EditError;
 use crate::dataset::export::language;
-use crate::dataset::files::info::{BY_MODEL, Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo};
+use crate::dataset::files::info::{BY_MODEL, Dtype, Info, LEROBOT_VERSION, NTP_VERSION, NtpInfo, counts_problem};
 use crate::dataset::files::layout::{self, FilePlace};
 use crate::dataset::files::stated::read_statistics;
 use crate::dataset::relabel::RelabelSummary;
@@ -24,7 +24,7 @@ use crate::dataset::tables::frames::feature::FEATURES;
 use crate::dataset::tables::texts::write::write_subtasks;
 use crate::program::KnownPrograms;
 use crate::table::{BatchReader, BatchWriter, Values, WriteOptions};
-use crate::words::{counted, or_nothing};
+use crate::words::counted;
 
 /// Rows that are read at a time.
 const BATCH_ROWS: usize = 4096;
@@ -62,13 +62,7 @@ pub(super) fn write(
     let expected = (info["total_episodes"].as_u64(), info["total_frames"].as_u64());
     if expected != (Some(summary.episodes), Some(summary.frames)) {
         let found = (summary.episodes, summary.frames);
-        let problem = format!(
-            "it counts {} episodes and {} frames, but there are {} and {}",
-            or_nothing(expected.0),
-            or_nothing(expected.1),
-            found.0,
-            found.1
-        );
+        let problem = counts_problem(expected.into(), found.into());
         return Err(EditError::refused("import.rows", &root.join(layout::INFO), problem));
     }
     write_episodes(root, to, &written.episodes, &written.statistics)?;

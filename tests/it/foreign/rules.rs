@@ -299,14 +299,18 @@ fn what_is_declared_beyond_all_measure_is_found_and_never_allocated() {
 fn an_edit_names_what_it_does_not_carry_over() {
     let folder = written(|_| {});
     std::fs::write(folder.path().join("meta/temporal_proportions_sparse.json"), "{}").unwrap();
-    std::fs::create_dir(folder.path().join("annotations")).unwrap();
+    std::fs::create_dir_all(folder.path().join("annotations/task-0000")).unwrap();
+    std::fs::create_dir(folder.path().join("images")).unwrap();
     std::fs::write(folder.path().join(".DS_Store"), "").unwrap();
     let elsewhere = tempfile::tempdir().unwrap();
     let (dataset, to) = (folder.path().to_str().unwrap(), elsewhere.path().join("to"));
     let words = ["dataset", "filter", dataset, "--episodes", "0-1", "--to", to.to_str().unwrap()];
     let (code, _, stderr) = run(&words);
     let told = "not carried over: annotations, meta/temporal_proportions_sparse.json";
-    assert!(code == 3 && stderr.contains(told) && !stderr.contains("DS_Store"), "{code} {stderr}");
+    assert!(
+        code == 3 && stderr.contains(told) && !stderr.contains("DS_Store") && !stderr.contains("images"),
+        "{code} {stderr}"
+    );
 }
 
 #[test]
