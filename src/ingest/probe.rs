@@ -8,7 +8,7 @@ use super::decode::Decoder;
 use super::error::IngestError;
 use super::map::{FeatureMap, Map, NumberType, Store};
 use super::observe::Observer;
-use super::picture::packet_size;
+use super::picture::{Reason, packet_size};
 use super::sample::{Content, ContentKind, Sampler};
 use crate::dataset::plain::{Dtype, PlainFeature, PlainKind};
 use crate::recording::read_messages;
@@ -25,6 +25,23 @@ pub(super) struct Feature<'m> {
 impl Feature<'_> {
     pub(super) fn declared(&self) -> PlainFeature {
         PlainFeature { name: self.map.name.clone(), kind: self.kind.clone() }
+    }
+
+    /// Why what a message gives has no place in a feature; nothing where it has. `width` numbers come from its topic.
+    pub(super) fn misfit(&self, found: &ContentKind, width: usize) -> Option<Reason> {
+        match (found, &self.kind) {
+            (ContentKind::Numbers(names), PlainKind::Numbers(..)) => {
+                let n = names.len();
+                (n != width).then(|| format!("it has {}, and the first message had {width}", counted(n, "number")))
+            }
+            (ContentKind::Text, PlainKind::Text) | (ContentKind::Packets, PlainKind::Video(_)) => None,
+            (ContentKind::Image(found), PlainKind::Image(size) | PlainKind::Video(size)) => {
+                let [[width, height], [of_first, high]] = [found, size];
+                (found != size)
+                    .then(|| format!("it is of {width}x{height} pixels, and the first one of {of_first}x{high}"))
+            }
+            _ => Some("it is of another kind than the first message".to_owned()),
+        }
     }
 }
 

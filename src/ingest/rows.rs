@@ -12,13 +12,12 @@ use super::map::{Clock, Map, Task, nanos};
 use super::observe::Observer;
 use super::picture::Reason;
 use super::probe::{self, Feature};
-use super::sample::{Content, ContentKind, Sampler};
+use super::sample::{Content, Sampler};
 use super::track::{Taken, Track};
 use super::value::Value;
 use crate::dataset::plain::{Cell, Picture, PlainKind, PlainWriter};
 use crate::recording::{AnyMessage, read_messages};
 use crate::video::{H264Encoder, VideoError};
-use crate::words::counted;
 
 /// The rows of all files.
 pub(super) struct Rows<'m> {
@@ -189,8 +188,8 @@ impl<'r, 'm> Reading<'r, 'm> {
         let (feature, track) = &mut self.tracks[number];
         track.counts.messages += 1;
         let taken = message.map_err(Clone::clone).and_then(|message| self.samplers[number].take(message));
-        let kind = &self.features[*feature].kind;
-        let fitting = taken.and_then(|(content, of)| misfit(&of, kind, track.width).map_or(Ok(content), Err));
+        let feature = &self.features[*feature];
+        let fitting = taken.and_then(|(content, kind)| feature.misfit(&kind, track.width).map_or(Ok(content), Err));
         match fitting {
             Ok(content) => {
                 track.push(at, content);
@@ -412,21 +411,5 @@ impl<'r, 'm> Reading<'r, 'm> {
             self.summary.topics.entry(source.topic.clone()).or_default().add(counts);
         }
         Ok(())
-    }
-}
-
-/// Why what a message gives has no place in a feature; nothing where it has. `width` numbers come from its topic.
-fn misfit(found: &ContentKind, expected: &PlainKind, width: usize) -> Option<Reason> {
-    match (found, expected) {
-        (ContentKind::Numbers(names), PlainKind::Numbers(..)) => {
-            let n = names.len();
-            (n != width).then(|| format!("it has {}, and the first message had {width}", counted(n, "number")))
-        }
-        (ContentKind::Text, PlainKind::Text) | (ContentKind::Packets, PlainKind::Video(_)) => None,
-        (ContentKind::Image(found), PlainKind::Image(size) | PlainKind::Video(size)) => {
-            let [[width, height], [of_first, high]] = [found, size];
-            (found != size).then(|| format!("it is of {width}x{height} pixels, and the first one of {of_first}x{high}"))
-        }
-        _ => Some("it is of another kind than the first message".to_owned()),
     }
 }
