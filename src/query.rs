@@ -48,7 +48,7 @@ pub use tables::{TableInfo, Tables};
 ///
 /// See the module.
 pub fn query(tables: &Tables, sql: &str) -> Result<Answer, QueryError> {
-    let panicked = |words| QueryError::Panic { words };
+    let panicked = |words| QueryError::Panic { words, instead: "" };
     match catch_panic(|| statement::read(sql)).map_err(panicked)?? {
         Asked::Columns { table } => tables.columns_of(&table),
         Asked::Tables => tables.listed(),
@@ -56,7 +56,11 @@ pub fn query(tables: &Tables, sql: &str) -> Result<Answer, QueryError> {
     }
 }
 
-fn answer(tables: &Tables, Rows { sql, relations, has_elements }: &Rows) -> Result<Answer, QueryError> {
+/// What to write where Polars breaks off on tables that are crossed.
+const OF_CROSSED: &str = "; columns of crossed tables are compared by = alone: write the rest over a window, or as columns of \
+                          a query within";
+
+fn answer(tables: &Tables, Rows { sql, relations, has_elements, is_crossed }: &Rows) -> Result<Answer, QueryError> {
     let frames = tables.scan(|name| relations.contains(name), *has_elements)?;
     let execute = || {
         let mut context = SQLContext::new();
@@ -66,7 +70,8 @@ fn answer(tables: &Tables, Rows { sql, relations, has_elements }: &Rows) -> Resu
         let rows = collect(context.execute(sql)?)?;
         if has_order(sql) { Ok(rows) } else { sorted(rows) }
     };
-    let answer = catch_panic(execute).map_err(|words| QueryError::Panic { words })?;
+    let instead = if *is_crossed { OF_CROSSED } else { "" };
+    let answer = catch_panic(execute).map_err(|words| QueryError::Panic { words, instead })?;
     answer.map(Answer::new).map_err(|source| QueryError::Refused { source, tables: tables.names() })
 }
 

@@ -69,13 +69,12 @@ pub enum QueryError {
         tables: Vec<&'static str>,
     },
     /// Polars broke off on a statement that it should have refused.
-    #[error(
-        "the statement cannot be answered ({words}); where tables are crossed, columns of the one and the other are compared \
-         by = alone: write the rest over a window, or as columns of a query within"
-    )]
+    #[error("the statement cannot be answered: {words}{instead}")]
     Panic {
         /// What it said.
         words: String,
+        /// What to write instead, behind a semicolon, where that is known.
+        instead: &'static str,
     },
     /// A format has no place for a value.
     #[error("column {column:?} is {kind}, for which CSV has no form; choose other columns, JSON or Parquet")]

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use sqlparser::ast::{
-    Expr, ObjectName, Query, Select, SetExpr, ShowStatementOptions, Statement, TableFactor, Visit, VisitMut, Visitor,
-    VisitorMut,
+    Expr, Join, JoinOperator, ObjectName, Query, Select, SetExpr, ShowStatementOptions, Statement, TableFactor, Visit,
+    VisitMut, Visitor, VisitorMut,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserOptions};
@@ -31,6 +31,8 @@ pub(super) struct Rows {
     pub(super) relations: BTreeSet<String>,
     /// Whether elements of lists are asked for, as `x[1]` or by a function.
     pub(super) has_elements: bool,
+    /// Whether every row of a table is paired with every row of another.
+    pub(super) is_crossed: bool,
 }
 
 /// Reads a statement.
@@ -98,6 +100,7 @@ impl Visitor for Check<'_> {
     type Break = Box<QueryError>;
 
     fn pre_visit_query(&mut self, query: &Query) -> ControlFlow<Self::Break> {
+        self.0.is_crossed |= query.body.as_select().is_some_and(is_crossed);
         match body(&query.body) {
             Some(error) => ControlFlow::Break(Box::new(error)),
             None => ControlFlow::Continue(()),
@@ -141,6 +144,11 @@ impl Visitor for Check<'_> {
         }
         ControlFlow::Continue(())
     }
+}
+
+fn is_crossed(select: &Select) -> bool {
+    let is_cross = |join: &Join| matches!(join.join_operator, JoinOperator::CrossJoin(_));
+    select.from.len() > 1 || select.from.iter().any(|from| from.joins.iter().any(is_cross))
 }
 
 /// Why a body cannot be answered.
