@@ -41,7 +41,7 @@ impl Recorded<'_> {
         let family = first.task.family;
         // Counts begin with those of the bowls, where there are any.
         let n_bowls = family.max_bowls().map_or(0, usize::from);
-        let has_categories = family.max_instances().is_some();
+        let has_categories = family.has_categories();
         let range = |counts: &[u16]| {
             let counts = counts.get(n_bowls..).filter(|_| has_categories)?;
             Some([*counts.iter().min()?, *counts.iter().max()?])

@@ -7,7 +7,7 @@ use crate::rollout::SuiteFacts;
 pub(super) fn of_suite(spec: &PipelineSpec, suite: &SuiteSpec) -> SuiteFacts {
     let family = spec.tasks.family;
     let simulation = suite.simulation(&spec.generate.simulation);
-    let ends = |counts: CountsSpec| family.max_instances().map(|_| [counts.min, counts.max]);
+    let ends = |counts: CountsSpec| family.has_categories().then_some([counts.min, counts.max]);
     SuiteFacts {
         family,
         blocks: family.max_blocks().map(|most| spec.tasks.blocks.unwrap_or(most)),

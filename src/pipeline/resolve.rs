@@ -9,7 +9,7 @@ use crate::model::Decoder;
 use crate::perception::PerceptionConfig;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
-use crate::task::{Family, Split};
+use crate::task::{Family, Layout, Split};
 
 /// So many tasks are held out at most when the pipeline file says nothing.
 const MAX_DEFAULT_UNSEEN: u32 = 1000;
@@ -142,22 +142,39 @@ impl Pipeline {
                 return Err(self.value(&key, format!("camera {} is named twice", camera.name)));
             }
         }
-        self.check_counts("generate.counts", generate.counts)
+        self.check_counts("generate.counts", generate.counts, generate.simulation.layout())
     }
 
-    fn check_counts(&self, key: &str, counts: Option<CountsSpec>) -> Result<(), PipelineError> {
+    fn check_counts(&self, key: &str, counts: Option<CountsSpec>, layout: Layout) -> Result<(), PipelineError> {
         let Some(CountsSpec { min, max }) = counts else { return Ok(()) };
         let family = self.spec.tasks.family;
-        let Some(most) = family.max_instances() else {
+        let Some(most) = family.max_instances(layout) else {
             return Err(self.value(key, format!("{} has no categories; leave it out", family.name())));
         };
         if min < 1 || max > most || min > max {
+            let place = match layout {
+                Layout::Table => "the table",
+                Layout::Bench => "an arm's bench",
+            };
             let problem = format!(
-                "is {min} to {max}; allowed is 1 <= min <= max <= {most}, as many as the table holds of one category"
+                "is {min} to {max}; allowed is 1 <= min <= max <= {most}, as many as {place} holds of one category"
             );
             return Err(self.value(key, problem));
         }
         Ok(())
+    }
+
+    /// How many things are demonstrated, and how many lie where the robot acts: as many as are demonstrated where nothing
+    /// else is said.
+    fn check_suite_counts(&self, key: &impl Fn(&str) -> String, suite: &SuiteSpec) -> Result<(), PipelineError> {
+        let generate = &self.spec.generate;
+        self.check_counts(&key("demonstrated"), suite.demonstrated, generate.simulation.layout())?;
+        let acted = suite.simulation(&generate.simulation).layout();
+        match (suite.on_table, suite.demonstrated) {
+            (Some(on_table), _) => self.check_counts(&key("on_table"), Some(on_table), acted),
+            (None, Some(demonstrated)) => self.check_counts(&key("demonstrated"), Some(demonstrated), acted),
+            (None, None) => self.check_counts(&key("layout"), generate.counts, acted),
+        }
     }
 
     fn check_models(&self) -> Result<(), PipelineError> {
@@ -258,8 +275,7 @@ impl Pipeline {
             return Err(self.value(&key(field), problem));
         }
         self.check_towers(&key, suite)?;
-        self.check_counts(&key("demonstrated"), suite.demonstrated)?;
-        self.check_counts(&key("on_table"), suite.on_table)?;
+        self.check_suite_counts(&key, suite)?;
         self.check_bowls(&key("bowls"), suite.bowls)
     }
 

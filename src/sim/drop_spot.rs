@@ -20,7 +20,10 @@ const BOWL_OPENING_M: f32 = 0.014;
 const BOWL_MARGIN_M: f32 = 0.002;
 /// A spot must be this much lower than one nearer to the middle, in metres.
 const LOWER_M: f32 = 0.003;
-/// The spots, as parts of the free half widths, nearest to the middle first.
+/// Least distance of spots in a box, in metres.
+const SPOT_PITCH_M: f32 = 0.039;
+/// The spots of a box that has room for one at each side of the middle, as parts of the free half widths, nearest to the
+/// middle first.
 const SPOTS: [[f32; 2]; 9] =
     [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
 
@@ -76,7 +79,8 @@ pub(super) fn choose(
             let load = scene.body(held.body).shape.half_extents_m();
             let room = free_half_widths_m([x, y], gripper.half_widths_m(), &load);
             let spot = |[part_x, part_y]: [f32; 2]| Vector::new(part_x * room[0], part_y * room[1], 0.0);
-            SPOTS.iter().map(|&parts| over(&in_world, spot(parts), &tool)).collect()
+            let n_aside = room.map(|room| (room / SPOT_PITCH_M) as i16);
+            parts(n_aside).into_iter().map(|parts| over(&in_world, spot(parts), &tool)).collect()
         }
         Shape::Bowl(bowl) => bowl_spots(world, gripper, bowl.floor_radius_m)
             .map(|spot| Vector::new(in_world.translation.x, in_world.translation.y, tool.position.z) + spot)
@@ -91,6 +95,18 @@ pub(super) fn choose(
         }
     }
     best.0
+}
+
+/// The spots of a box with so many at each side of the middle, one at least.
+fn parts([n_x, n_y]: [i16; 2]) -> Vec<[f32; 2]> {
+    if n_x <= 1 && n_y <= 1 {
+        return SPOTS.to_vec();
+    }
+    let steps = |n: i16| (-n..=n).map(move |step| f32::from(step) / f32::from(n));
+    let mut parts: Vec<[f32; 2]> = steps(n_x.max(1)).flat_map(|x| steps(n_y.max(1)).map(move |y| [x, y])).collect();
+    let aside = |[x, y]: &[f32; 2]| x * x + y * y;
+    parts.sort_by(|a, b| aside(a).total_cmp(&aside(b)));
+    parts
 }
 
 fn over(container_in_world: &EnginePose, spot: Vector, tool: &Tool) -> Vector {

@@ -116,9 +116,18 @@ impl Family {
         self.kinds().iter().flat_map(|kind| kind.slots).nth(usize::from(slot.0)).copied().unwrap_or("no slot")
     }
 
-    /// The most instances of one category that the table holds; nothing for a family without categories.
-    pub fn max_instances(self) -> Option<u16> {
-        let most = |kind: &SlotKind| if let Bodies::Many { most } = kind.bodies { Some(most) } else { None };
+    /// Whether some of its slots are categories, of which there may be any number of instances.
+    pub fn has_categories(self) -> bool {
+        self.max_instances(Layout::Table).is_some()
+    }
+
+    /// The most instances of one category that a layout holds; nothing for a family without categories.
+    pub fn max_instances(self, layout: Layout) -> Option<u16> {
+        let most = |kind: &SlotKind| match (kind.bodies, layout) {
+            (Bodies::Many { most, .. }, Layout::Table) => Some(most),
+            (Bodies::Many { most_on_bench, .. }, Layout::Bench) => Some(most_on_bench),
+            _ => None,
+        };
         self.kinds().iter().filter_map(most).max()
     }
 

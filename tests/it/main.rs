@@ -60,6 +60,8 @@ mod lerobot;
 #[cfg(test)]
 mod lineage;
 #[cfg(test)]
+mod many_objects;
+#[cfg(test)]
 mod model;
 #[cfg(test)]
 mod painter;

@@ -402,7 +402,7 @@ fn every_shipped_pipeline_can_be_loaded() {
     }
 }
 
-fn check_refused(change: impl Fn(&str) -> String, key: &str, allowed: &str) {
+pub(crate) fn check_refused(change: impl Fn(&str) -> String, key: &str, allowed: &str) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("wrong.toml");
     let text = std::fs::read_to_string(repository().join("pipelines/smoke.toml")).unwrap();

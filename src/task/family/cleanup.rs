@@ -36,7 +36,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
             slots: &["fork"],
             brings_about: Some(Condition::inside),
             room: Room::Nothing,
-            bodies: Bodies::Many { most: MAX_FORKS },
+            bodies: Bodies::Many { most: MAX_FORKS, most_on_bench: MAX_FORKS },
         },
         SlotKind { name: "tray", slots: &["tray"], brings_about: None, room: Room::One, bodies: Bodies::One },
     ],

@@ -27,7 +27,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
             slots: &CATEGORY_NAMES,
             brings_about: Some(Condition::inside),
             room: Room::Nothing,
-            bodies: Bodies::Many { most: MAX_INSTANCES },
+            bodies: Bodies::Many { most: MAX_INSTANCES, most_on_bench: MAX_ON_BENCH },
         },
         SlotKind {
             name: "container",
@@ -58,6 +58,13 @@ const CONTAINER_PITCH_M: f32 = 0.26;
 const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
 
+/// From more objects on there are more cells, and containers are larger.
+const MANY: usize = 40;
+const MANY_CELLS: [usize; 2] = [11, 8];
+const MANY_CENTER_Y_M: f32 = -0.17;
+const MANY_INNER_M: [f32; 3] = [0.12, 0.13, 0.18];
+const MANY_CONTAINER_Y_M: f32 = 0.37;
+
 /// Before the arm, whose base is at x = -0.62: objects in a field, containers at both sides, 0.6 m from the base's axis
 /// and 62 and 95 degrees off the way that it looks.
 const BENCH: Bench = Bench {
@@ -73,7 +80,9 @@ const BENCH_JITTER_M: f32 = 0.0025;
 const BENCH_CONTAINERS_M: [[f32; 2]; 4] = [[-0.338, -0.53], [-0.672, -0.598], [-0.338, 0.53], [-0.672, 0.598]];
 
 /// The most instances of one category.
-const MAX_INSTANCES: u16 = 10;
+const MAX_INSTANCES: u16 = 20;
+/// The same on a bench.
+const MAX_ON_BENCH: u16 = 10;
 
 const CATEGORY_NAMES: [&str; 4] = ["cube", "can", "ball", "brick"];
 const CATEGORY_COLORS: [[u8; 3]; 4] = [[214, 64, 69], [48, 128, 200], [240, 176, 32], [84, 168, 88]];
@@ -104,11 +113,12 @@ fn scene(counts: &[u16]) -> Scene {
         }));
         slots.push(Slot { name: (*name).to_owned(), bodies: (first..first + count).map(BodyIndex).collect() });
     }
+    let inner_m = if bodies.len() > MANY { MANY_INNER_M } else { CONTAINER_INNER_M };
     for (name, color) in CONTAINER_NAMES.iter().zip(CONTAINER_COLORS) {
         slots.push(Slot::single((*name).to_owned(), bodies.len()));
         bodies.push(Body {
             name: (*name).to_owned(),
-            shape: Shape::OpenBox { inner_m: CONTAINER_INNER_M, wall_m: CONTAINER_WALL_M },
+            shape: Shape::OpenBox { inner_m, wall_m: CONTAINER_WALL_M },
             mobility: Mobility::Fixed,
             color,
         });
@@ -127,11 +137,17 @@ struct Field {
 
 /// Random poses: objects in cells of their own, containers in any order behind them.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
-    let container_m = |column: f32| [column * CONTAINER_PITCH_M, CONTAINER_Y_M];
+    let n_objects = scene.bodies.iter().filter(|body| body.mobility == Mobility::Movable).count();
+    let (cells, center_y_m, container_y_m) = if n_objects > MANY {
+        (MANY_CELLS, MANY_CENTER_Y_M, MANY_CONTAINER_Y_M)
+    } else {
+        (OBJECT_CELLS, OBJECT_CENTER_Y_M, CONTAINER_Y_M)
+    };
+    let container_m = |column: f32| [column * CONTAINER_PITCH_M, container_y_m];
     let field = Field {
-        cells: OBJECT_CELLS,
+        cells,
         pitch_m: OBJECT_PITCH_M,
-        center_m: [0.0, OBJECT_CENTER_Y_M],
+        center_m: [0.0, center_y_m],
         jitter_m: OBJECT_JITTER_M,
         containers_m: [-1.5, -0.5, 0.5, 1.5].map(container_m),
     };

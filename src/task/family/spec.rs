@@ -89,6 +89,8 @@ pub enum Bodies {
     Many {
         /// The most that the table holds.
         most: u16,
+        /// The most that an arm's bench holds.
+        most_on_bench: u16,
     },
 }
 
