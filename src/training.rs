@@ -219,11 +219,8 @@ fn model(
         model.tasks.clone_from(&facts.task_ids);
     }
     if let Some((width, height)) = picture_size {
-        if width != height {
-            let (key, found) = ("size of the pictures", format!("{width}x{height} pixels"));
-            return Err(TrainError::Config { key, found, allowed: "as wide as high" });
-        }
-        model.network = model.network.for_pictures(width, n_slots);
+        let cameras = cameras_of(*variant, width, height)?;
+        model.network = model.network.for_pictures(width, cameras, n_slots);
         if let Some(colours) = config.colours {
             check_colours(*variant, colours, n_slots)?;
             model.network = model.network.telling_apart(colours as usize);
@@ -243,6 +240,18 @@ fn model(
         model.network = model.network.with_relations();
     }
     Ok(model)
+}
+
+/// How many cameras see a picture; each sees a square of it, one below the other.
+fn cameras_of(variant: Variant, width: usize, height: usize) -> Result<usize, TrainError> {
+    let (key, found) = ("size of the pictures", format!("{width}x{height} pixels"));
+    match height.checked_div(width) {
+        Some(cameras) if cameras > 0 && cameras * width == height => {
+            let allowed = "of one camera for a detector, as wide as high";
+            if variant.detects() && cameras > 1 { Err(TrainError::Config { key, found, allowed }) } else { Ok(cameras) }
+        }
+        _ => Err(TrainError::Config { key, found, allowed: "as wide as high, of each camera" }),
+    }
 }
 
 /// Refuses pictures that are too small for a network.

@@ -72,17 +72,17 @@ impl NetworkConfig {
         }
     }
 
-    /// The same for pictures of a size, with a colour for each of `n_slots` objects, one for the gripper and some for
-    /// what else there is to see; widths that see nothing stay as they are.
+    /// The same for pictures of a size, each of so many cameras, with a colour for each of `n_slots` objects, one for the
+    /// gripper and some for what else there is to see; widths that see nothing stay as they are. A detector has one camera.
     #[must_use]
-    pub fn for_pictures(self, pixels: usize, n_slots: usize) -> Self {
+    pub fn for_pictures(self, pixels: usize, cameras: usize, n_slots: usize) -> Self {
         let perception = ColourSlotsConfig { pixels, colours: n_slots + 1 + SPARE_COLOURS };
         match self {
-            Self::ColourSlots(config) => Self::ColourSlots(SightedConfig { perception, ..config }),
-            Self::Convolved(config) => Self::Convolved(ConvolvedConfig { pixels, ..config }),
+            Self::ColourSlots(config) => Self::ColourSlots(SightedConfig { perception, cameras, ..config }),
+            Self::Convolved(config) => Self::Convolved(ConvolvedConfig { pixels, cameras, ..config }),
             Self::Keypoints(config) => {
                 let perception = KeypointsConfig { pixels, slots: n_slots, ..config.perception };
-                Self::Keypoints(SightedConfig { perception, ..config })
+                Self::Keypoints(SightedConfig { perception, cameras, ..config })
             }
             Self::Detected(_, widths) => Self::Detected(PointDetectorConfig::of(perception), widths),
             Self::DetectedFlattened(config, widths) => {
@@ -164,6 +164,17 @@ impl NetworkConfig {
             Self::Detected(config, _) => Some(config.perception.pixels),
             Self::Keypoints(config) => Some(config.perception.pixels),
             Self::DetectedFlattened(config, _) => Some(config.pixels),
+        }
+    }
+
+    /// How many cameras it sees with; 0 where it sees nothing.
+    pub fn cameras(&self) -> usize {
+        match self {
+            Self::ObjectCentric(_) | Self::Flattened(_) | Self::Instructed(_) => 0,
+            Self::ColourSlots(config) => config.cameras,
+            Self::Convolved(config) => config.cameras,
+            Self::Keypoints(config) => config.cameras,
+            Self::Detected(..) | Self::DetectedFlattened(..) => 1,
         }
     }
 

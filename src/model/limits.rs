@@ -4,6 +4,8 @@
 const LARGEST: usize = 65_536;
 /// The longest kernel.
 const LONGEST: usize = 1001;
+/// The most cameras that a network sees with.
+const MOST_CAMERAS: usize = 16;
 
 /// A configuration that makes no sense.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -43,4 +45,19 @@ pub(crate) fn check_kernels(kernels: &[(&'static str, usize)]) -> Result<(), Con
         ConfigError::unless(kernel % 2 == 1 && kernel <= LONGEST, key, kernel, "odd, 1 to 1001")
     };
     kernels.iter().try_for_each(fits)
+}
+
+/// Refuses numbers of cameras that no network sees with.
+pub(crate) fn check_cameras(cameras: usize) -> Result<(), ConfigError> {
+    ConfigError::unless((1..=MOST_CAMERAS).contains(&cameras), "cameras", cameras, "1 to 16")
+}
+
+/// How many cameras see where none are counted.
+pub(crate) fn one_camera() -> usize {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+pub(crate) fn is_one_camera(cameras: &usize) -> bool {
+    *cameras == 1
 }

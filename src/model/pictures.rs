@@ -1,5 +1,7 @@
 //! What a network that sees is given to look at.
 
+use std::borrow::Cow;
+
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
 use crate::model::read_error::ReadError;
@@ -10,6 +12,8 @@ use crate::trace::GripperState;
 pub struct PictureIndex(pub u32);
 
 /// Colour pictures of one size, side by side.
+///
+/// Where several cameras look, a picture is what all of them see at one time, one below the other.
 ///
 /// # Shapes
 ///
@@ -38,6 +42,14 @@ pub struct PictureSample {
     pub lengths: Vec<usize>,
 }
 
+impl PictureSample {
+    /// What one of `n_cameras` sees of it.
+    pub(crate) fn of_camera(&self, camera: usize, n_cameras: usize) -> Self {
+        let pictures = self.pictures.of_camera(camera, n_cameras).into_owned();
+        Self { pictures, lengths: self.lengths.clone() }
+    }
+}
+
 impl Pictures {
     /// None yet, of a size.
     pub fn of_size(width: usize, height: usize) -> Self {
@@ -50,6 +62,18 @@ impl Pictures {
         self.rgb.extend_from_slice(rgb);
         self.grippers.push(gripper);
         self.n += 1;
+    }
+
+    /// What one of `n_cameras` sees, which are counted from 0 downwards.
+    pub(crate) fn of_camera(&self, camera: usize, n_cameras: usize) -> Cow<'_, Self> {
+        if n_cameras == 1 {
+            return Cow::Borrowed(self);
+        }
+        let height = self.height / n_cameras;
+        let n_bytes = self.width * height * 3;
+        let seen = self.iter().filter_map(|picture| picture.get(camera * n_bytes..(camera + 1) * n_bytes));
+        let rgb = seen.flatten().copied().collect();
+        Cow::Owned(Self { n: self.n, width: self.width, height, rgb, grippers: self.grippers.clone() })
     }
 
     /// Adds others of the same size; the first ones bring it.
@@ -146,7 +170,20 @@ fn box_means(values: &[f32], width: usize, height: usize) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::{box_means, contrasts};
+    use super::{Pictures, box_means, contrasts};
+    use crate::trace::GripperState;
+
+    #[test]
+    fn each_camera_sees_its_part_of_a_picture() {
+        let mut pictures = Pictures::of_size(1, 2);
+        pictures.push(&[1, 2, 3, 4, 5, 6], GripperState { in_world_m: [0.0; 3], closed: false });
+        pictures.push(&[7, 8, 9, 10, 11, 12], GripperState { in_world_m: [0.1; 3], closed: true });
+        let lower = pictures.of_camera(1, 2);
+        assert_eq!((lower.n, lower.width, lower.height), (2, 1, 1));
+        assert_eq!(lower.rgb, [4, 5, 6, 10, 11, 12]);
+        assert_eq!(lower.grippers, pictures.grippers);
+        assert_eq!(*pictures.of_camera(0, 1), pictures);
+    }
 
     #[test]
     fn a_mean_is_over_what_lies_in_the_picture() {

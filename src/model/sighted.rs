@@ -8,6 +8,8 @@
 //! temporal convolution over u_ji for each percept ─► all of them ─► argument
 //! ```
 //!
+//! Of several cameras each finds percepts of its own, in pairs among themselves; above that all percepts are alike.
+//!
 //! # Invariants
 //!
 //! A picture is looked at once, however many decisions it takes part in: their windows are gathered from its percepts.
@@ -24,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::encoder::{ArgumentDecoder, Encoder, Widths};
 use crate::model::layers::{Init, Mlp, TemporalConv, with_most_before};
-use crate::model::limits::{ConfigError, check_kernels, check_sizes};
+use crate::model::limits::{ConfigError, check_cameras, check_kernels, check_sizes, is_one_camera, one_camera};
 use crate::model::linear::Linear;
 use crate::model::perception::{Looks as _, PERCEPT_WIDTH, Perception};
 use crate::model::pictures::{PictureIndex, PictureSample, Pictures, picked};
@@ -58,6 +60,9 @@ const NAMING_LEAK: f64 = 0.1;
 pub struct SightedConfig<P> {
     /// Of the perception.
     pub perception: P,
+    /// How many cameras see, each with a perception of its own. Default 1.
+    #[serde(default = "one_camera", skip_serializing_if = "is_one_camera")]
+    pub cameras: usize,
     /// Features of a pair of percepts. Default 12.
     pub pair_width: usize,
     /// Features of a percept, of a frame, of the state, and of every hidden layer. Default 32.
@@ -73,18 +78,27 @@ pub struct SightedConfig<P> {
 impl<P> SightedConfig<P> {
     /// The default widths with a perception.
     pub fn of(perception: P) -> Self {
-        Self { perception, pair_width: 12, width: 32, program_width: 16, scope_kernel: 5, argument_kernel: 3 }
+        Self {
+            perception,
+            cameras: 1,
+            pair_width: 12,
+            width: 32,
+            program_width: 16,
+            scope_kernel: 5,
+            argument_kernel: 3,
+        }
     }
 
     /// Whether a network can have these sizes, those of the perception aside.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        let &Self { perception: _, pair_width, width, program_width, scope_kernel, argument_kernel } = self;
+        let &Self { perception: _, cameras, pair_width, width, program_width, scope_kernel, argument_kernel } = self;
+        check_cameras(cameras)?;
         check_sizes(&[("pair_width", pair_width), ("width", width), ("program_width", program_width)])?;
         check_kernels(&[("scope_kernel", scope_kernel), ("argument_kernel", argument_kernel)])
     }
 }
 
-/// The encoder of videos.
+/// The encoder of videos. What belongs to the first camera lies beside what all share, where models of one camera have it.
 #[derive(Module, Debug)]
 pub struct Sighted<P: Module> {
     perception: P,
@@ -98,6 +112,39 @@ pub struct Sighted<P: Module> {
     object: Linear,
     state: Mlp,
     scope_conv: TemporalConv,
+    others: Vec<Other<P>>,
+}
+
+/// What belongs to a camera behind the first.
+#[derive(Module, Debug)]
+struct Other<P: Module> {
+    perception: P,
+    pair_demonstration: Linear,
+    pair_state: Linear,
+    object_seen: Mlp,
+    state: Mlp,
+}
+
+/// What belongs to a camera.
+struct Eye<'e, P> {
+    perception: &'e P,
+    pair_demonstration: &'e Linear,
+    pair_state: &'e Linear,
+    object_seen: &'e Mlp,
+    state: &'e Mlp,
+}
+
+/// What a camera's pictures give by themselves.
+struct Seen<L> {
+    /// `[F, K * K, pair]` each.
+    pairs: [Tensor<3>; 2],
+    /// `[F, K, H]`
+    objects: Tensor<3>,
+    /// Most of the percepts, `[F, H]`.
+    state: Tensor<2>,
+    /// `[F, PERCEPT_WIDTH]`
+    robot: Tensor<2>,
+    looks: L,
 }
 
 /// A perception whose finds are given the names of slots.
@@ -116,29 +163,29 @@ pub struct PerceptNaming {
     slots: Linear,
 }
 
-/// What every picture gives by itself, `F` pictures of `K` percepts.
+/// What every picture gives by itself, `F` pictures of `C` cameras with `K` percepts each.
 #[derive(Clone, Debug)]
 pub struct Percepts<L> {
-    /// First layer of pairs as part of a demonstration, and as what is seen now: `[F, K * K, pair]` each.
+    /// First layer of pairs as part of a demonstration, and as what is seen now: `[F, C * K * K, pair]` each.
     pairs: [Tensor<3>; 2],
-    /// The same of percepts: `[F, K, H]` each.
+    /// The same of percepts: `[F, C * K, H]` each.
     objects: [Tensor<3>; 2],
-    /// The state with the robot, `[F, H + PERCEPT_WIDTH]`.
+    /// The state with the robot, `[F, H + C * PERCEPT_WIDTH]`.
     states: Tensor<2>,
-    /// What is kept besides.
-    looks: L,
+    /// What is kept besides, of each camera.
+    looks: Vec<L>,
 }
 
 /// Percepts of windows.
 #[derive(Clone, Debug)]
 pub struct SightedDemonstration<L> {
-    /// `[B, T, K * K, pair]`
+    /// `[B, T, C * K * K, pair]`
     pairs: Tensor<4>,
-    /// `[B, T, K, H]`
+    /// `[B, T, C * K, H]`
     objects: Tensor<4>,
     padding: Option<Padding>,
-    /// Of all pictures.
-    looks: L,
+    /// Of all pictures, of each camera.
+    looks: Vec<L>,
     /// How many these are.
     n_pictures: usize,
     /// The pictures that each window shows.
@@ -148,21 +195,54 @@ pub struct SightedDemonstration<L> {
 /// Demonstration and state, compared.
 #[derive(Clone, Debug)]
 pub struct SightedReading<L> {
-    /// Each percept in each frame, `[B, T, K, H]`.
+    /// Each percept in each frame, `[B, T, C * K, H]`.
     pub(crate) objects: Tensor<4>,
     /// Each frame with its neighbours, `[B, T, H]`; zero beyond a window.
     frames: Tensor<3>,
     /// Most and last of the window, `[B, 2 H]`.
     context: Tensor<2>,
-    /// The state with the robot, `[B, H + PERCEPT_WIDTH]`.
+    /// The state with the robot, `[B, H + C * PERCEPT_WIDTH]`.
     state: Tensor<2>,
     pub(crate) padding: Option<Padding>,
-    /// What is kept besides of the window's first and last frame.
-    pub(crate) ends: [L; 2],
+    /// What is kept besides of the window's first and last frame, of each camera.
+    pub(crate) ends: Vec<[L; 2]>,
+}
+
+impl<P: Perception> Eye<'_, P> {
+    fn see(&self, pictures: &Pictures) -> Result<Seen<P::Looks>, ReadError> {
+        let (seen, looks) = self.perception.look(pictures)?; // [F, K, PERCEPT_WIDTH]
+        let [n_pictures, n_percepts, _] = seen.dims();
+        let places = seen.clone().narrow(2, 0, 2);
+        let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
+        let relative = place_features(places.clone() - robot.clone().narrow(2, 0, 2));
+        let appearance = seen * LINEAR_GAIN;
+        let robots = (robot * LINEAR_GAIN).expand([n_pictures, n_percepts, PERCEPT_WIDTH]);
+        let objects = Tensor::<3>::cat(vec![relative, appearance, robots.clone()], 2);
+        let columns: Tensor<4> = places.clone().unsqueeze_dim(1);
+        let rows: Tensor<4> = places.unsqueeze_dim(2);
+        let pairs = place_features(rows - columns).reshape([n_pictures, n_percepts * n_percepts, PLACE_WIDTH]);
+        Ok(Seen {
+            pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
+            objects: self.object_seen.forward(objects.clone()),
+            state: self.state.forward(objects).max_dim(1).squeeze_dim(1),
+            robot: robots.narrow(1, 0, 1).squeeze_dim(1),
+            looks,
+        })
+    }
 }
 
 impl<P: Perception> Sighted<P> {
-    /// Each percept in each frame, compared with its pairs and itself now: `[B, T, K, H]`.
+    /// From the first camera to the last.
+    fn eyes(&self) -> impl Iterator<Item = Eye<'_, P>> {
+        let Self { perception, pair_demonstration, pair_state, object_seen, state, .. } = self;
+        let first = Eye { perception, pair_demonstration, pair_state, object_seen, state };
+        std::iter::once(first).chain(self.others.iter().map(|other| {
+            let Other { perception, pair_demonstration, pair_state, object_seen, state } = other;
+            Eye { perception, pair_demonstration, pair_state, object_seen, state }
+        }))
+    }
+
+    /// Each percept in each frame, compared with its pairs and itself now: `[B, T, C * K, H]`.
     fn compare(
         &self,
         demonstration: &SightedDemonstration<P::Looks>,
@@ -171,9 +251,10 @@ impl<P: Perception> Sighted<P> {
     ) -> Tensor<4> {
         let SightedDemonstration { pairs, objects, .. } = demonstration;
         let [n_batch, n_frames, n_percepts, _] = objects.dims();
-        let compared = self.pair.forward(relu(pairs.clone() + pairs_now.unsqueeze_dim(1))); // [B, T, K * K, pair]
-        let n_pair = compared.dims()[3];
-        let relations = compared.reshape([n_batch * n_frames, n_percepts, n_percepts, n_pair]).max_dim(2);
+        let compared = self.pair.forward(relu(pairs.clone() + pairs_now.unsqueeze_dim(1))); // [B, T, C * K * K, pair]
+        let [_, _, n_pairs, n_pair] = compared.dims();
+        let each = n_pairs / n_percepts.max(1);
+        let relations = compared.reshape([n_batch * n_frames, n_percepts, each, n_pair]).max_dim(2);
         let relations = relations.reshape([n_batch, n_frames, n_percepts, n_pair]);
         let hidden = self.object_pairs.forward(relations) + objects.clone() + objects_now.unsqueeze_dim(1);
         relu(self.object.forward(relu(hidden)))
@@ -188,7 +269,7 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
     type Argument = P::Decoder;
 
     fn new(config: &Self::Config, _n_slots: usize, init: &mut Init) -> Self {
-        let &SightedConfig { perception, pair_width, width, scope_kernel, .. } = config;
+        let &SightedConfig { perception, cameras, pair_width, width, scope_kernel, .. } = config;
         let n_object = pair_width + 2 * width;
         Self {
             perception: P::new(&perception, init),
@@ -202,40 +283,52 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
             object: init.linear(width, width),
             state: init.mlp(&[OBJECT_WIDTH, width, width]),
             scope_conv: init.temporal_conv(scope_kernel, width, width),
+            others: (1..cameras)
+                .map(|_| Other {
+                    perception: P::new(&perception, init),
+                    pair_demonstration: init.part(PLACE_WIDTH, pair_width, 2 * PLACE_WIDTH),
+                    pair_state: init.linear(PLACE_WIDTH, pair_width),
+                    object_seen: init.mlp(&[OBJECT_WIDTH, width, width]),
+                    state: init.mlp(&[OBJECT_WIDTH, width, width]),
+                })
+                .collect(),
         }
     }
 
     fn widths(config: &Self::Config) -> Widths {
-        let &SightedConfig { width, program_width, .. } = config;
+        let &SightedConfig { cameras, width, program_width, .. } = config;
         let (context, frame) = (2 * width, 2 * width);
-        Widths { context, state: width + PERCEPT_WIDTH, frame, program: program_width, core: vec![width] }
+        Widths { context, state: width + cameras * PERCEPT_WIDTH, frame, program: program_width, core: vec![width] }
     }
 
     fn calibrated(mut self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError> {
-        self.perception = self.perception.calibrated(sample, seed)?;
+        let n_cameras = self.others.len() + 1;
+        let others = self.others.into_iter().enumerate().map(|(number, other)| {
+            let sample = sample.of_camera(number + 1, n_cameras);
+            let seed = seed.derive("camera", &[number as u64 + 1]);
+            Ok(Other { perception: other.perception.calibrated(&sample, seed)?, ..other })
+        });
+        self.others = others.collect::<Result<_, ReadError>>()?;
+        self.perception = self.perception.calibrated(&sample.of_camera(0, n_cameras), seed)?;
         Ok(self)
     }
 
     fn perceive(&self, pictures: &Pictures) -> Result<Percepts<P::Looks>, ReadError> {
-        let (seen, looks) = self.perception.look(pictures)?; // [F, K, PERCEPT_WIDTH]
-        let [n_pictures, n_percepts, _] = seen.dims();
-        let places = seen.clone().narrow(2, 0, 2);
-        let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
-        let relative = place_features(places.clone() - robot.clone().narrow(2, 0, 2));
-        let appearance = seen * LINEAR_GAIN;
-        let robots = (robot * LINEAR_GAIN).expand([n_pictures, n_percepts, PERCEPT_WIDTH]);
-        let objects = Tensor::<3>::cat(vec![relative, appearance, robots.clone()], 2);
-        let columns: Tensor<4> = places.clone().unsqueeze_dim(1);
-        let rows: Tensor<4> = places.unsqueeze_dim(2);
-        let pairs = place_features(rows - columns).reshape([n_pictures, n_percepts * n_percepts, PLACE_WIDTH]);
-        let hidden = self.object_seen.forward(objects.clone());
-        let state: Tensor<2> = self.state.forward(objects).max_dim(1).squeeze_dim(1);
-        let robot = robots.narrow(1, 0, 1).squeeze_dim(1);
+        let n_cameras = self.others.len() + 1;
+        let see = |(camera, eye): (usize, Eye<'_, P>)| eye.see(&pictures.of_camera(camera, n_cameras));
+        let seen: Vec<Seen<P::Looks>> = self.eyes().enumerate().map(see).collect::<Result<_, _>>()?;
+        let beside = |part: fn(&Seen<P::Looks>) -> &Tensor<3>| -> Tensor<3> {
+            Tensor::cat(seen.iter().map(|seen| part(seen).clone()).collect(), 1)
+        };
+        let hidden = beside(|seen| &seen.objects);
+        let pairs = [beside(|seen| &seen.pairs[0]), beside(|seen| &seen.pairs[1])];
+        let states: Option<Tensor<2>> = seen.iter().map(|seen| seen.state.clone()).reduce(Tensor::max_pair);
+        let robots = seen.iter().map(|seen| seen.robot.clone());
         Ok(Percepts {
-            pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
+            pairs,
             objects: [self.object_demonstration.forward(hidden.clone()), self.object_state.forward(hidden)],
-            states: Tensor::cat(vec![state, robot], 1),
-            looks,
+            states: Tensor::cat(states.into_iter().chain(robots).collect(), 1),
+            looks: seen.into_iter().map(|seen| seen.looks).collect(),
         })
     }
 
@@ -288,12 +381,14 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
         let padding = demonstration.padding.as_ref();
         let (frames, context) = summarize(&self.scope_conv, objects.clone().max_dim(2).squeeze_dim(2), padding);
         let state = percepts.states.clone().select(0, now);
-        let end = |end: fn(&[PictureIndex]) -> Option<&PictureIndex>| -> Result<P::Looks, ReadError> {
+        let end = |end: fn(&[PictureIndex]) -> Option<&PictureIndex>| {
             let shown: Vec<PictureIndex> =
                 demonstration.shown.iter().map(|window| end(window).copied().unwrap_or_default()).collect();
-            Ok(demonstration.looks.select(picked(&shown, demonstration.n_pictures, &device)?))
+            picked(&shown, demonstration.n_pictures, &device)
         };
-        let ends = [end(<[_]>::first)?, end(<[_]>::last)?];
+        let (first, last) = (end(<[_]>::first)?, end(<[_]>::last)?);
+        let ends = |looks: &P::Looks| [looks.select(first.clone()), looks.select(last.clone())];
+        let ends = demonstration.looks.iter().map(ends).collect();
         Ok(SightedReading { objects, frames, context, state, padding: demonstration.padding.clone(), ends })
     }
 
@@ -316,13 +411,13 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
 
 impl<P: Naming> ArgumentDecoder<Sighted<P>> for PerceptNaming {
     fn new(config: &SightedConfig<P::Config>, n_slots: usize, _n_view: usize, init: &mut Init) -> Self {
-        let &SightedConfig { perception, width, program_width, argument_kernel, .. } = config;
+        let &SightedConfig { perception, cameras, width, program_width, argument_kernel, .. } = config;
         let n_context = program_width + width;
         Self {
             conv: init.temporal_conv(argument_kernel, width, width),
             object: init.part(2 * width, width, 2 * width + n_context),
             context: init.linear(n_context, width),
-            slots: init.linear_within(P::n_percepts(&perception) * width, n_slots, NAMING_BOUND),
+            slots: init.linear_within(cameras * P::n_percepts(&perception) * width, n_slots, NAMING_BOUND),
         }
     }
 

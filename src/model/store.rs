@@ -204,7 +204,12 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
 }
 
 fn pixels(config: &ModelConfig) -> String {
-    config.network.pixels().map_or("none".to_owned(), |pixels| format!("of {pixels}x{pixels} pixels"))
+    let Some(pixels) = config.network.pixels() else { return "none".to_owned() };
+    let each = format!("of {pixels}x{pixels} pixels");
+    match config.network.cameras() {
+        0 | 1 => each,
+        cameras => format!("{each} from {cameras} cameras"),
+    }
 }
 
 /// Loads a trained model onto a device for inference and hands its network on.

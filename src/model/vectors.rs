@@ -9,7 +9,7 @@ use crate::model::convolution::Convolution;
 use crate::model::encoder::TrainingDefaults;
 use crate::model::features::{self, flat_width};
 use crate::model::layers::Init;
-use crate::model::limits::{ConfigError, check_kernels, check_sizes};
+use crate::model::limits::{ConfigError, check_cameras, check_kernels, check_sizes, is_one_camera, one_camera};
 use crate::model::pictures::{Pictures, picked};
 use crate::model::read_error::ReadError;
 use crate::model::specification_rows::States;
@@ -141,6 +141,9 @@ pub struct ConvolvedConfig {
     pub pixels: usize,
     /// Features of a picture: 128, the paper's.
     pub features: usize,
+    /// How many cameras see, each through convolutions of its own. Default 1.
+    #[serde(default = "one_camera", skip_serializing_if = "is_one_camera")]
+    pub cameras: usize,
     /// Widths of the encoder above.
     pub flattened: FlattenedConfig,
 }
@@ -148,12 +151,13 @@ pub struct ConvolvedConfig {
 impl ConvolvedConfig {
     /// The paper's.
     pub fn of_pixels(pixels: usize) -> Self {
-        Self { pixels, features: 128, flattened: FlattenedConfig::default() }
+        Self { pixels, features: 128, cameras: 1, flattened: FlattenedConfig::default() }
     }
 
     /// Whether a network can have these sizes.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         check_sizes(&[("pixels", self.pixels), ("features", self.features)])?;
+        check_cameras(self.cameras)?;
         self.flattened.check()
     }
 }
@@ -162,7 +166,8 @@ impl ConvolvedConfig {
 const LAYERS: [(usize, usize); 6] = [(16, 2), (24, 1), (32, 2), (48, 2), (64, 2), (64, 1)];
 
 /// The paper's picture network: seven convolutions from 64x64 pixels to a vector of 128. The paper gives no more than
-/// these figures; channels and strides are ours.
+/// these figures; channels and strides are ours. Of several cameras each has convolutions of its own, and the vectors stand
+/// side by side.
 ///
 /// # Source
 ///
@@ -170,6 +175,8 @@ const LAYERS: [(usize, usize); 6] = [(16, 2), (24, 1), (32, 2), (48, 2), (64, 2)
 #[derive(Module, Debug)]
 pub struct Convolved {
     layers: Vec<Convolution>,
+    /// Of the cameras behind the first.
+    others: Vec<Vec<Convolution>>,
 }
 
 impl Convolved {
@@ -182,13 +189,8 @@ impl Vectors for Convolved {
     type Percepts = Tensor<2>;
 
     fn new(config: &ConvolvedConfig, _n_slots: usize, init: &mut Init) -> Self {
-        let (mut layers, mut channels, mut pixels) = (Vec::new(), 3, config.pixels);
-        for (n_channels, stride) in LAYERS {
-            layers.push(init.conv([channels, n_channels], [3, stride, 1]));
-            (channels, pixels) = (n_channels, pixels.div_ceil(stride));
-        }
-        layers.push(init.conv([channels, config.features], [pixels.max(1), 1, 0]));
-        Self { layers }
+        let layers = convolutions(config, init);
+        Self { layers, others: (1..config.cameras).map(|_| convolutions(config, init)).collect() }
     }
 
     fn widths(config: &ConvolvedConfig) -> &FlattenedConfig {
@@ -196,14 +198,15 @@ impl Vectors for Convolved {
     }
 
     fn width(config: &ConvolvedConfig, _n_slots: usize) -> usize {
-        config.features
+        config.cameras * config.features
     }
 
-    /// `F` pictures → `[F, features]`.
+    /// `F` pictures → `[F, cameras * features]`.
     fn perceive(&self, pictures: &Pictures) -> Tensor<2> {
-        let pixels = pictures.to_tensor(&self.layers[0].device());
-        let seen = self.layers.iter().fold(pixels, |seen, layer| relu(layer.forward(seen)));
-        seen.flatten(1, 3)
+        let n_cameras = self.others.len() + 1;
+        let cameras = std::iter::once(&self.layers).chain(&self.others).enumerate();
+        let vectors = cameras.map(|(camera, layers)| convolved(layers, &pictures.of_camera(camera, n_cameras)));
+        Tensor::cat(vectors.collect(), 1)
     }
 
     fn of_windows(&self, windows: &Windows, percepts: &Tensor<2>, device: &Device) -> Result<Tensor<3>, ReadError> {
@@ -216,4 +219,21 @@ impl Vectors for Convolved {
         let n_pictures = percepts.dims()[0];
         Ok(percepts.clone().select(0, picked(states.pictures()?, n_pictures, device)?))
     }
+}
+
+/// Those of one camera.
+fn convolutions(config: &ConvolvedConfig, init: &mut Init) -> Vec<Convolution> {
+    let (mut layers, mut channels, mut pixels) = (Vec::new(), 3, config.pixels);
+    for (n_channels, stride) in LAYERS {
+        layers.push(init.conv([channels, n_channels], [3, stride, 1]));
+        (channels, pixels) = (n_channels, pixels.div_ceil(stride));
+    }
+    layers.push(init.conv([channels, config.features], [pixels.max(1), 1, 0]));
+    layers
+}
+
+/// `F` pictures → `[F, features]`.
+fn convolved(layers: &[Convolution], pictures: &Pictures) -> Tensor<2> {
+    let pixels = pictures.to_tensor(&layers[0].device());
+    layers.iter().fold(pixels, |seen, layer| relu(layer.forward(seen))).flatten(1, 3)
 }

@@ -1,10 +1,10 @@
-//! The pictures that a variant that sees learns from: what the first camera filmed, from the dataset.
+//! The pictures that a model that sees learns from: what its cameras filmed, from the dataset.
 
 use std::path::PathBuf;
 
 use crate::dataset::{DatasetError, DatasetTrials, EpisodeRows, PictureLoader, Wanted};
 use crate::model::Pictures;
-use crate::pipeline::{Pipeline, PipelineError, RunDir};
+use crate::pipeline::RunDir;
 use crate::render::CameraConfig;
 use crate::trace::GripperState;
 use crate::training::{Galleries, Gallery, TrainError};
@@ -14,44 +14,43 @@ const MOST_BYTES: usize = 1 << 28;
 
 /// The pictures of a dataset's trials, decoded while a step is computed.
 pub(super) struct Streamed {
-    loader: PictureLoader,
+    /// Of each camera.
+    loaders: Vec<PictureLoader>,
     /// The gripper in each frame of each trial.
     grippers: Vec<Vec<GripperState>>,
 }
 
-/// Finds the pictures of trials in the dataset.
-///
-/// # Errors
-///
-/// When the dataset has no pictures of the camera, or none of a trial's frame: it was made before there was a camera.
-pub(super) fn open(pipeline: &Pipeline, run: &RunDir, trials: &DatasetTrials) -> Result<Streamed, PipelineError> {
-    Ok(OfBuffers::new(pipeline, run).find(trials)?)
-}
-
 /// Finds the pictures of whatever trials are in memory.
 pub(super) struct OfBuffers<'p> {
-    camera: Option<&'p CameraConfig>,
+    cameras: Vec<&'p CameraConfig>,
     dataset: PathBuf,
 }
 
 impl<'p> OfBuffers<'p> {
-    pub(super) fn new(pipeline: &'p Pipeline, run: &RunDir) -> Self {
-        Self { camera: pipeline.spec.generate.cameras.first(), dataset: run.dataset().path().to_owned() }
+    pub(super) fn new(cameras: Vec<&'p CameraConfig>, run: &RunDir) -> Self {
+        Self { cameras, dataset: run.dataset().path().to_owned() }
     }
 
-    fn find(&self, trials: &DatasetTrials) -> Result<Streamed, DatasetError> {
-        let camera = self.camera.map(|camera| camera.name.as_str()).unwrap_or_default();
-        let rows = trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() });
-        let loader = PictureLoader::open(&self.dataset, camera, rows.collect(), MOST_BYTES)?;
-        Ok(Streamed { loader, grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect() })
+    /// Finds the pictures of trials in the dataset.
+    ///
+    /// # Errors
+    ///
+    /// When the dataset has no pictures of a camera, or none of a trial's frame: it was made before there was a camera.
+    pub(super) fn find(&self, trials: &DatasetTrials) -> Result<Streamed, DatasetError> {
+        let most_bytes = MOST_BYTES / self.cameras.len().max(1);
+        let rows =
+            || trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() }).collect();
+        let loader = |camera: &&CameraConfig| PictureLoader::open(&self.dataset, &camera.name, rows(), most_bytes);
+        Ok(Streamed {
+            loaders: self.cameras.iter().map(loader).collect::<Result<_, _>>()?,
+            grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect(),
+        })
     }
 }
 
 impl Galleries for OfBuffers<'_> {
     fn size(&self) -> (usize, usize) {
-        let [width, height] =
-            self.camera.map(|camera| camera.size_px).unwrap_or_default().map(|pixels| pixels as usize);
-        (width, height)
+        size(self.cameras.iter().map(|camera| camera.size_px))
     }
 
     fn open(&self, trials: &DatasetTrials) -> Result<Box<dyn Gallery>, TrainError> {
@@ -61,20 +60,33 @@ impl Galleries for OfBuffers<'_> {
 
 impl Gallery for Streamed {
     fn size(&self) -> (usize, usize) {
-        let [width, height] = self.loader.size_px().map(|pixels| pixels as usize);
-        (width, height)
+        size(self.loaders.iter().map(PictureLoader::size_px))
     }
 
     fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String> {
-        let pictures = self.loader.get(wanted).map_err(|error| error.to_string())?;
-        for (&frame, picture) in wanted.frames.iter().zip(pictures) {
+        let of_camera = |loader: &PictureLoader| loader.get(wanted).map_err(|error| error.to_string());
+        let cameras = self.loaders.iter().map(of_camera).collect::<Result<Vec<_>, _>>()?;
+        for (number, &frame) in wanted.frames.iter().enumerate() {
             let gripper = self.grippers.get(wanted.position).and_then(|grippers| grippers.get(frame));
-            into.push(&picture, *gripper.ok_or_else(|| format!("frame {frame} has no gripper"))?);
+            let gripper = *gripper.ok_or_else(|| format!("frame {frame} has no gripper"))?;
+            match cameras.as_slice() {
+                [pictures] => into.push(&pictures[number], gripper),
+                several => {
+                    let seen: Vec<u8> = several.iter().flat_map(|pictures| pictures[number].iter().copied()).collect();
+                    into.push(&seen, gripper);
+                }
+            }
         }
         Ok(())
     }
 
     fn announce(&self, wanted: &[Wanted]) {
-        self.loader.announce(wanted);
+        self.loaders.iter().for_each(|loader| loader.announce(wanted));
     }
+}
+
+/// Pixels across and down the pictures of cameras, one below the other.
+fn size(cameras: impl Iterator<Item = [u32; 2]>) -> (usize, usize) {
+    let sizes = cameras.map(|size| size.map(|pixels| pixels as usize));
+    sizes.fold((0, 0), |(across, down), [width, height]| (across.max(width), down + height))
 }

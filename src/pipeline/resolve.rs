@@ -9,6 +9,7 @@ use crate::model::Decoder;
 use crate::perception::PerceptionConfig;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
+use crate::render::CameraConfig;
 use crate::task::{Family, Layout, Split};
 
 /// So many tasks are held out at most when the pipeline file says nothing.
@@ -200,22 +201,44 @@ impl Pipeline {
             if let Err(problem) = model.training(model.seeds[0]).check() {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
-            if let Some(problem) = model.variant.sees().then(|| self.blindness()).flatten() {
-                return Err(self.value(&format!("models[{idx}].variant"), format!("is {}; {problem}", model.variant)));
-            }
+            self.check_seeing(idx, model)?;
             self.check_acting(idx, model)?;
         }
         Ok(())
     }
 
-    /// What keeps a variant that sees from seeing.
-    fn blindness(&self) -> Option<&'static str> {
-        match self.spec.generate.cameras.first() {
-            None => Some("it sees with the first of generate.cameras, and there is none"),
-            Some(camera) if camera.size_px[0] != camera.size_px[1] => {
-                Some("the first of generate.cameras must be as wide as high")
+    /// What a model looks with.
+    fn check_seeing(&self, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
+        let refuse = |field: &str, problem: String| Err(self.value(&format!("models[{idx}].{field}"), problem));
+        let there = &self.spec.generate.cameras;
+        let names = || there.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
+        if !model.variant.sees() {
+            let problem = format!("is there for {}, which sees nothing; leave it out", model.variant);
+            return if model.cameras.is_empty() { Ok(()) } else { refuse("cameras", problem) };
+        }
+        if there.is_empty() {
+            let problem = "it sees with cameras, and there are none in generate.cameras";
+            return refuse("variant", format!("is {}; {problem}", model.variant));
+        }
+        if let Some(twice) = first_repeated(&model.cameras) {
+            return refuse("cameras", format!("{twice:?} is there twice"));
+        }
+        if let Some(unknown) = model.cameras.iter().find(|name| there.iter().all(|camera| camera.name != **name)) {
+            return refuse("cameras", format!("{unknown:?} is no camera of generate.cameras; there are {}", names()));
+        }
+        if model.variant.detects() && model.cameras.len() > 1 {
+            let problem = format!("are {}; a detector looks with one", model.cameras.join(", "));
+            return refuse("cameras", problem);
+        }
+        let looks_with = model.looks_with(&self.spec.generate);
+        let size = looks_with[0].size_px;
+        let is_other = |camera: &&&CameraConfig| camera.size_px != size || size[0] != size[1];
+        match looks_with.iter().find(is_other) {
+            None => Ok(()),
+            Some(CameraConfig { name, size_px: [width, height], .. }) => {
+                let allowed = "as wide as high, and all of one size";
+                refuse("cameras", format!("{name} has {width} x {height} pixels; allowed are pictures {allowed}"))
             }
-            Some(_) => None,
         }
     }
 

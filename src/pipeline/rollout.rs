@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, Manifest, Receipt, StageDir};
-use crate::model::{ComputeDevice, Decoder, ModelConfig, Variant, check_purpose, load_config};
+use crate::model::{ComputeDevice, Decoder, ModelConfig, check_purpose, load_config};
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, perceiving, simulation_config, world};
@@ -16,9 +16,11 @@ use crate::pipeline::train::{self, Model};
 use crate::pipeline::trials::trial;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{
-    OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, Study, SuiteSpec, detections, facts, tasks,
+    ModelSpec, OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, Study, SuiteSpec, detections, facts,
+    tasks,
 };
 use crate::recording::ShardWriter;
+use crate::render::CameraConfig;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
     self, Acted, DetectionRows, Limits, ModelFacts, Noisy, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows,
@@ -27,7 +29,7 @@ use crate::rollout::{
 use crate::seed::Seed;
 use crate::sim::Simulation;
 use crate::task::{Split, Task, TaskSet};
-use crate::trace::{Actor, Episode, Provenance, SpecificationForm};
+use crate::trace::{Actor, Episode, Provenance};
 
 /// Raised when the same settings act otherwise, or tell more of it.
 const VERSION: u32 = 3;
@@ -209,8 +211,7 @@ struct Acting<'j> {
 /// demonstrations.
 struct Learned {
     folder: PathBuf,
-    variant: Variant,
-    specification: SpecificationForm,
+    spec: ModelSpec,
     decoder: Decoder,
     /// Whether the decoder is the model's first.
     is_first: bool,
@@ -228,7 +229,7 @@ fn learned(run: &RunDir, ModelActor { model, decoder }: ModelActor<'_>) -> Learn
     };
     let folder = model.dir(run).path().to_owned();
     let is_first = spec.decoders.first() == Some(&decoder);
-    Learned { folder, variant: spec.variant, specification: spec.specification(), decoder, is_first, acted }
+    Learned { folder, spec: spec.clone(), decoder, is_first, acted }
 }
 
 impl Learned {
@@ -237,10 +238,12 @@ impl Learned {
     fn policy(&self, pipeline: &Pipeline, device: ComputeDevice) -> Result<Box<dyn Policy>, PipelineError> {
         let found = load_config(&self.folder)?;
         let family = pipeline.spec.tasks.family;
-        let mut wanted =
-            ModelConfig::new(self.variant, self.specification, family, family.n_slots(), found.training.clone());
-        if let Some(camera) = pipeline.spec.generate.cameras.first() {
-            wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, wanted.n_slots);
+        let ModelSpec { variant, .. } = self.spec;
+        let form = self.spec.specification();
+        let mut wanted = ModelConfig::new(variant, form, family, family.n_slots(), found.training.clone());
+        let cameras = self.spec.looks_with(&pipeline.spec.generate);
+        if let Some(camera) = cameras.first() {
+            wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, cameras.len(), wanted.n_slots);
         }
         check_purpose(&found, &wanted, &self.folder)?;
         Ok(load_policy_on(&device.open()?, &self.folder, self.decoder)?.1)
@@ -342,20 +345,26 @@ impl Acting<'_> {
         Ok(Start { task, demonstration, world: Box::new(world), sight, provenance })
     }
 
-    /// What a model that sees is given: the first camera's pictures, as in the dataset that it learned from.
+    /// What the model looks with; nothing where it does not see.
+    fn cameras(&self) -> Vec<&CameraConfig> {
+        let of = |learned: &Learned| learned.spec.looks_with(&self.pipeline.spec.generate);
+        self.learned.as_ref().map(of).unwrap_or_default()
+    }
+
+    /// What a model that sees is given: its cameras' pictures, as in the dataset that it learned from.
     fn sight(&self, demonstration: &Episode, world: &Simulation, seed: Seed) -> Result<Option<Sight>, PipelineError> {
-        let sees = self.learned.as_ref().is_some_and(|learned| learned.variant.sees());
-        let camera = self.pipeline.spec.generate.cameras.first().filter(|_| sees);
-        let look = |camera| {
-            sight(camera, demonstration, world.scene(), seed).map_err(|source| PipelineError::Sight {
-                suite: self.spec.name.clone(),
-                episode: demonstration.provenance.index,
-                task_id: demonstration.provenance.task_id.clone(),
-                camera: camera.name.clone(),
-                source: Box::new(source),
-            })
+        let cameras = self.cameras();
+        if cameras.is_empty() {
+            return Ok(None);
+        }
+        let failed = |(camera, source)| PipelineError::Sight {
+            suite: self.spec.name.clone(),
+            episode: demonstration.provenance.index,
+            task_id: demonstration.provenance.task_id.clone(),
+            camera,
+            source: Box::new(source),
         };
-        camera.map(look).transpose()
+        sight(&cameras, demonstration, world.scene(), seed).map(Some).map_err(failed)
     }
 
     fn demonstration(&self, task: &Task, episode: u32) -> Result<Episode, PipelineError> {
@@ -388,10 +397,9 @@ impl Acting<'_> {
         by: &Acted,
         starts: &[Start<'_>],
     ) -> Result<Option<DetectionRows>, PipelineError> {
-        let detects = self.learned.as_ref().is_some_and(|learned| learned.variant.detects() && learned.is_first);
-        let Some(camera) = self.pipeline.spec.generate.cameras.first().filter(|_| detects) else {
-            return Ok(None);
-        };
+        let detects = self.learned.as_ref().is_some_and(|learned| learned.spec.variant.detects() && learned.is_first);
+        let cameras = self.cameras();
+        let Some(camera) = cameras.first().filter(|_| detects) else { return Ok(None) };
         detections::of_starts(policy, &self.spec.name, by, camera, starts).map_err(|error| self.failed(error.into()))
     }
 

@@ -141,6 +141,10 @@ pub struct ModelSpec {
     /// Train on the first so many training tasks (of each experiment); all when left out.
     #[serde(default)]
     pub train_tasks: Option<u32>,
+    /// For a variant that sees: the names of the cameras that it looks with, in demonstrations and when it acts; the first of
+    /// `generate.cameras` when left out. All have pictures of one size, as wide as high. A detector looks with one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<String>,
     /// What it reads as task specification: trajectories, or for variant `ntp` also instructions.
     #[serde(default)]
     pub specification: SpecificationForm,
@@ -174,6 +178,18 @@ impl ModelSpec {
     /// What it reads as task specification.
     pub fn specification(&self) -> SpecificationForm {
         self.variant.specification(self.specification)
+    }
+
+    /// What it looks with, of those that there are; nothing where it does not see.
+    pub(super) fn looks_with<'s>(&self, generate: &'s GenerateSpec) -> Vec<&'s CameraConfig> {
+        if !self.variant.sees() {
+            return Vec::new();
+        }
+        if self.cameras.is_empty() {
+            return generate.cameras.first().into_iter().collect();
+        }
+        let named = |name: &String| generate.cameras.iter().find(|camera| camera.name == *name);
+        self.cameras.iter().filter_map(named).collect()
     }
 
     /// One of its training runs.

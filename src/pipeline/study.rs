@@ -210,6 +210,9 @@ impl Study {
             let allowed = "allowed are variants that read positions and a demonstration of them";
             return refuse("variant", format!("is {}; {allowed}", model.variant));
         }
+        if !model.cameras.is_empty() {
+            return refuse("cameras", "is of models that see; a study's own read positions".to_owned());
+        }
         if model.specification() == SpecificationForm::Instructions {
             let problem = "is instructions, whose words name other slots in each family; allowed is trajectories";
             return refuse("specification", problem.to_owned());

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 use crate::artifact::{IoError, StageDir};
 use crate::dataset::{self, DatasetTrials, LearnedTrials, TrialData};
 use crate::model::{CONFIG_FILE, CoreKind, WEIGHTS_FILE};
+use crate::pipeline::gallery::OfBuffers;
 use crate::pipeline::layout::model_name;
 use crate::pipeline::unit::{Amount, Job, Looked, Made, Unit, Worker};
-use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, gallery, tasks};
+use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir, Stage, Study, tasks};
 use crate::task::Split;
 use crate::training::{
     self, DETECTOR_METRICS_FILE, Galleries, Gallery, Hooks, METRICS_FILE, Place, Source, TrialStream,
@@ -158,6 +159,9 @@ impl Unit for Model<'_> {
         if self.spec.variant.detects() {
             settings["detector_given"] = json!("gripper");
         }
+        if !self.spec.cameras.is_empty() {
+            settings["cameras"] = json!(self.spec.cameras);
+        }
         if let LearnsFrom::Study(_) = self.source {
             settings["experiments"] = json!(self.spec.experiments);
         }
@@ -221,17 +225,18 @@ impl Worker for Trainer<'_> {
         let place = Place { device: job.context.options.device, folder: job.dir.path(), start };
         let mut train = |source: Source<'_>| training::train_at(place, &training, source, &mut hooks);
         let sees = match unit.source {
-            LearnsFrom::Experiment(pipeline) if unit.spec.variant.sees() => Some(pipeline),
+            LearnsFrom::Experiment(pipeline) if unit.spec.variant.sees() => {
+                Some(OfBuffers::new(unit.spec.looks_with(&pipeline.spec.generate), job.context.dir))
+            }
             LearnsFrom::Experiment(_) | LearnsFrom::Study(_) => None,
         };
         let summary = match trials {
             Trials::Here(data) => {
-                let gallery = sees.map(|pipeline| gallery::open(pipeline, job.context.dir, data)).transpose()?;
+                let gallery = sees.map(|galleries| galleries.find(data)).transpose()?;
                 train(Source::Here(data, gallery.as_ref().map(|gallery| gallery as &dyn Gallery)))
             }
             Trials::Streamed(stream) => {
-                let galleries = sees.map(|pipeline| gallery::OfBuffers::new(pipeline, job.context.dir));
-                train(Source::Streamed(stream, galleries.as_ref().map(|galleries| galleries as &dyn Galleries)))
+                train(Source::Streamed(stream, sees.as_ref().map(|galleries| galleries as &dyn Galleries)))
             }
         };
         job.context.go_on()?;

@@ -24,7 +24,7 @@ fn config(variant: Variant) -> ModelConfig {
     let config = ModelConfig::new(variant, form, Family::BlockStacking, 8, Value::Null);
     let network = match config.network {
         NetworkConfig::ObjectCentric(_) => NetworkConfig::ObjectCentric(SMALL),
-        other => other.for_pictures(64, 8).narrowed(64),
+        other => other.for_pictures(64, 1, 8).narrowed(64),
     };
     ModelConfig { network, ..config }
 }

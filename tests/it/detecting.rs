@@ -211,7 +211,7 @@ fn no_network_but_one_behind_a_detector_reads_the_gripper_s_state() {
     for variant in end_to_end.into_iter().chain([Variant::NTP_VID_DETECTOR, Variant::NTP_VID_DETECTOR_PAPER]) {
         let mut config =
             ModelConfig::new(variant, SpecificationForm::Video, Family::BlockStacking, 8, serde_json::Value::Null);
-        config.network = config.network.for_pictures(64, 8).narrowed(32);
+        config.network = config.network.for_pictures(64, 1, 8).narrowed(32);
         let [a, b] = [&still, &moved]
             .map(|pictures| with_network(&config, Seed(1), &Device::flex(), Decided(pictures)).unwrap());
         assert_eq!(a == b, end_to_end.contains(&variant), "{variant}");

@@ -98,6 +98,8 @@ mod schemas_parquet;
 #[cfg(test)]
 mod seeing;
 #[cfg(test)]
+mod several_cameras;
+#[cfg(test)]
 mod sim;
 #[cfg(test)]
 mod smoke;

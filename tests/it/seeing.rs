@@ -13,29 +13,33 @@ use ntp::rollout::{Limits, Start, load_policy, run};
 use ntp::seed::Seed;
 use ntp::task::{Family, Split, Task, sample};
 use ntp::trace::{Actor, Episode, GripperState, Provenance, SpecificationForm};
-use ntp::training::{Hooks, TrainConfig, Training, train, train_on_pictures};
+use ntp::training::{Gallery, Hooks, TrainConfig, Training, train, train_on_pictures};
 
 use crate::kinematic::{KinematicWorld, demonstration, tower, trial};
 use crate::painter::{Painter, Paintings};
 use crate::training::trial_data;
 
-fn shown(tasks: &[Task], n_trials: u32) -> (DatasetTrials, Paintings) {
+pub(crate) fn shown(tasks: &[Task], n_trials: u32) -> (DatasetTrials, Paintings) {
     let of_task =
         |task: &Task| (0..n_trials).map(|idx| demonstration(task, &trial(task, idx, 1), 0)).collect::<Vec<_>>();
     let episodes: Vec<Episode> = tasks.iter().flat_map(of_task).collect();
     (DatasetTrials { n_slots: 8, trials: episodes.iter().map(trial_data).collect() }, Paintings(episodes))
 }
 
-fn training(steps: u32) -> Training {
+pub(crate) fn training(steps: u32) -> Training {
     let config = TrainConfig { steps: Some(steps), warmup_steps: 20, ..TrainConfig::default() };
     Training { variant: Variant::NTP_VID_E2E, specification: SpecificationForm::Video, seed: 0, config }
 }
 
 fn learn(training: &Training, (data, paintings): &(DatasetTrials, Paintings), folder: &Path) -> f32 {
+    learn_from(training, data, paintings, folder)
+}
+
+pub(crate) fn learn_from(training: &Training, data: &DatasetTrials, gallery: &dyn Gallery, folder: &Path) -> f32 {
     let mut loss = f32::NAN;
     let mut on_progress = |progress: ntp::training::Progress| loss = progress.loss;
     let hooks = &mut Hooks { on_progress: &mut on_progress, should_stop: &|| false };
-    train_on_pictures(training, data, Some(paintings), folder, hooks).unwrap();
+    train_on_pictures(training, data, Some(gallery), folder, hooks).unwrap();
     loss
 }
 

@@ -72,7 +72,7 @@ fn a_model_s_configuration_is_of_its_variant_whatever_has_a_name() {
     for variant in Variant::every() {
         let form = variant.specification(SpecificationForm::default());
         let mut config = ModelConfig::new(variant, form, Family::BlockStacking, 8, json!(null));
-        config.network = config.network.for_pictures(64, 8);
+        config.network = config.network.for_pictures(64, 1, 8);
         assert_eq!(config.check(), Ok(()), "{variant}");
         let again: ModelConfig = from_value(to_value(&config).unwrap()).unwrap();
         assert_eq!(again, config);

@@ -37,18 +37,20 @@ pub struct GlimpseNaming {
     object: Linear,
     context: Linear,
     slot: Linear,
+    /// Of the cameras behind the first: before and after.
+    others: Vec<[Linear; 2]>,
 }
 
 impl GlimpseNaming {
     /// Evidence for each slot about the robot, `[B, N]`: a softmax over places, not one chosen place, so that it can
     /// be learned where to look.
-    fn glimpsed(&self, [first, last]: &[CellLooks; 2], context: &Tensor<2>) -> Tensor<2> {
+    fn glimpsed([before, after]: [&Linear; 2], [first, last]: &[CellLooks; 2], context: &Tensor<2>) -> Tensor<2> {
         let looked_at = attention(last);
         let evidence = |glimpse: &Linear, looks: &CellLooks| -> Tensor<2> {
             let prior: Tensor<3> = glimpse.forward(context.clone()).unsqueeze_dim(2); // [B, places, 1]
             log_sum_exp(looked_at.clone().matmul(looks.scores.clone()) + prior)
         };
-        evidence(&self.before, first) + evidence(&self.after, last)
+        evidence(before, first) + evidence(after, last)
     }
 }
 
@@ -81,7 +83,7 @@ fn log_sum_exp(scores: Tensor<3>) -> Tensor<2> {
 
 impl ArgumentDecoder<Sighted<Keypoints>> for GlimpseNaming {
     fn new(config: &SightedConfig<KeypointsConfig>, _n_slots: usize, _n_view: usize, init: &mut Init) -> Self {
-        let &SightedConfig { width, program_width, argument_kernel, .. } = config;
+        let &SightedConfig { cameras, width, program_width, argument_kernel, .. } = config;
         let n_context = program_width + width;
         let n_places = GLIMPSE[0] * GLIMPSE[1];
         Self {
@@ -91,6 +93,9 @@ impl ArgumentDecoder<Sighted<Keypoints>> for GlimpseNaming {
             object: init.part(2 * width, width, 2 * width + n_context),
             context: init.linear(n_context, width),
             slot: init.linear(width, 1),
+            others: (1..cameras)
+                .map(|_| [init.linear(n_context, n_places), init.linear(n_context, n_places)])
+                .collect(),
         }
     }
 
@@ -102,15 +107,21 @@ impl ArgumentDecoder<Sighted<Keypoints>> for GlimpseNaming {
         hidden: Tensor<2>,
     ) -> Tensor<2> {
         let padding = reading.padding.as_ref();
-        let n_slots = reading.objects.dims()[2] - 1;
-        let objects = Padding::mask_objects(padding, reading.objects.clone().narrow(2, 1, n_slots));
-        let last = Padding::last_objects(padding, objects.clone());
-        let moving = Padding::mask_objects(padding, self.conv.forward(objects)).max_dim(1).squeeze_dim(1);
+        let n_percepts = reading.objects.dims()[2] / reading.ends.len().max(1);
         let context = Tensor::cat(vec![program, hidden], 1);
-        let object = self.object.forward(Tensor::<3>::cat(vec![moving, last], 2)); // [B, N, H]
         let hidden: Tensor<3> = self.context.forward(context.clone()).unsqueeze_dim(1);
-        let pointed: Tensor<2> = self.slot.forward(relu(object + hidden)).squeeze_dim(2);
-        pointed + self.glimpsed(&reading.ends, &context)
+        let evidence = |camera: usize, glimpse: [&Linear; 2]| {
+            let objects = reading.objects.clone().narrow(2, camera * n_percepts + 1, n_percepts - 1);
+            let objects = Padding::mask_objects(padding, objects);
+            let last = Padding::last_objects(padding, objects.clone());
+            let moving = Padding::mask_objects(padding, self.conv.forward(objects)).max_dim(1).squeeze_dim(1);
+            let object = self.object.forward(Tensor::<3>::cat(vec![moving, last], 2)); // [B, N, H]
+            let pointed: Tensor<2> = self.slot.forward(relu(object + hidden.clone())).squeeze_dim(2);
+            pointed + Self::glimpsed(glimpse, &reading.ends[camera], &context)
+        };
+        let first = evidence(0, [&self.before, &self.after]);
+        let others = self.others.iter().zip(1..);
+        others.fold(first, |sum, ([before, after], camera)| sum + evidence(camera, [before, after]))
     }
 }
 
