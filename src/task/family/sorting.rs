@@ -50,7 +50,7 @@ pub(super) static SPEC: FamilySpec = FamilySpec {
 /// Cells that sorting objects start on, and their pitch.
 const OBJECT_CELLS: [usize; 2] = [9, 7];
 const OBJECT_PITCH_M: f32 = 0.085;
-/// Keeps any two objects at least 7 cm apart.
+/// Keeps any two objects at least 7 cm apart, as all jitters here do.
 const OBJECT_JITTER_M: f32 = 0.0075;
 const OBJECT_CENTER_Y_M: f32 = -0.15;
 const CONTAINER_Y_M: f32 = 0.34;
@@ -58,11 +58,13 @@ const CONTAINER_PITCH_M: f32 = 0.26;
 const CONTAINER_INNER_M: [f32; 3] = [0.1, 0.1, 0.12];
 const CONTAINER_WALL_M: f32 = 0.005;
 
-/// From more objects on there are more cells, and containers are larger.
+/// From more objects on they lie closer, in more cells, and containers are larger.
 const MANY: usize = 40;
-const MANY_CELLS: [usize; 2] = [11, 8];
-const MANY_CENTER_Y_M: f32 = -0.17;
-const MANY_INNER_M: [f32; 3] = [0.12, 0.13, 0.18];
+const MANY_CELLS: [usize; 2] = [10, 8];
+const MANY_PITCH_M: f32 = 0.08;
+const MANY_JITTER_M: f32 = 0.005;
+const MANY_CENTER_Y_M: f32 = -0.16;
+const MANY_INNER_M: [f32; 3] = [0.12, 0.13, 0.15];
 const MANY_CONTAINER_Y_M: f32 = 0.37;
 
 /// Before the arm, whose base is at x = -0.62: objects in a field, containers at both sides, 0.6 m from the base's axis
@@ -138,18 +140,23 @@ struct Field {
 /// Random poses: objects in cells of their own, containers in any order behind them.
 fn poses(scene: &Scene, rng: &mut ChaCha8Rng) -> Vec<Pose> {
     let n_objects = scene.bodies.iter().filter(|body| body.mobility == Mobility::Movable).count();
-    let (cells, center_y_m, container_y_m) = if n_objects > MANY {
-        (MANY_CELLS, MANY_CENTER_Y_M, MANY_CONTAINER_Y_M)
+    let containers = |y_m: f32| [-1.5, -0.5, 0.5, 1.5].map(|column: f32| [column * CONTAINER_PITCH_M, y_m]);
+    let field = if n_objects > MANY {
+        Field {
+            cells: MANY_CELLS,
+            pitch_m: MANY_PITCH_M,
+            center_m: [0.0, MANY_CENTER_Y_M],
+            jitter_m: MANY_JITTER_M,
+            containers_m: containers(MANY_CONTAINER_Y_M),
+        }
     } else {
-        (OBJECT_CELLS, OBJECT_CENTER_Y_M, CONTAINER_Y_M)
-    };
-    let container_m = |column: f32| [column * CONTAINER_PITCH_M, container_y_m];
-    let field = Field {
-        cells,
-        pitch_m: OBJECT_PITCH_M,
-        center_m: [0.0, center_y_m],
-        jitter_m: OBJECT_JITTER_M,
-        containers_m: [-1.5, -0.5, 0.5, 1.5].map(container_m),
+        Field {
+            cells: OBJECT_CELLS,
+            pitch_m: OBJECT_PITCH_M,
+            center_m: [0.0, OBJECT_CENTER_Y_M],
+            jitter_m: OBJECT_JITTER_M,
+            containers_m: containers(CONTAINER_Y_M),
+        }
     };
     scattered(scene, &field, rng)
 }
