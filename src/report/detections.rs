@@ -15,7 +15,7 @@ use polars::prelude::DataType;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::actor::ModelParts;
+use crate::report::actor::{ModelParts, model_name};
 use crate::report::facts::BLOCK_STACKING;
 use crate::report::frames::{Rows, collect, scan};
 use crate::report::paper::{DETECTOR_BLOCKS, DETECTOR_DEVIATION_CM};
@@ -47,6 +47,8 @@ const LARGE_CM: f64 = 2.0;
 pub struct DetectionsInput {
     /// Of which experiment.
     pub experiment: String,
+    /// The model's tag.
+    pub tag: Option<String>,
     /// Its detections.parquet.
     pub path: PathBuf,
 }
@@ -95,6 +97,8 @@ pub struct DetectionError {
     /// Its parts.
     #[serde(flatten)]
     pub parts: ModelParts,
+    /// What tells it apart from other models of its variant; null for most.
+    pub tag: Option<String>,
     /// How many tasks it was trained on.
     pub train_tasks: i64,
     /// The set of evaluation tasks.
@@ -122,7 +126,7 @@ pub struct DetectionError {
 }
 
 /// What tells rows of the result apart, in their order.
-type Key = (String, String, String, i64, InSight);
+type Key = (String, String, String, Option<String>, i64, InSight);
 
 /// The errors of some detections.
 #[derive(Debug, Default)]
@@ -148,7 +152,8 @@ pub(super) fn read(inputs: &[DetectionsInput], results: &[SuiteResult]) -> Resul
         for row in 0..table.height() {
             for in_sight in [InSight::All, InSight::of(shares[row])] {
                 let (suite, variant) = (suites[row].clone(), variants[row].clone());
-                let key = (suite, input.experiment.clone(), variant, train_tasks[row], in_sight);
+                let (experiment, tag) = (input.experiment.clone(), input.tag.clone());
+                let key = (suite, experiment, variant, tag, train_tasks[row], in_sight);
                 by_key.entry(key).or_default().add(seeds[row], [0, 1, 2].map(|axis| axes[axis][row]));
             }
         }
@@ -157,7 +162,8 @@ pub(super) fn read(inputs: &[DetectionsInput], results: &[SuiteResult]) -> Resul
     for error in &mut errors {
         let own = |result: &&SuiteResult| {
             let actor = &result.actor;
-            (&actor.experiment, &actor.variant, &result.suite) == (&error.experiment, &error.variant, &error.suite)
+            (&actor.experiment, &actor.variant, &actor.tag, &result.suite)
+                == (&error.experiment, &error.variant, &error.tag, &error.suite)
         };
         let Some(result) = results.iter().find(own) else { continue };
         error.parts = result.actor.parts.clone();
@@ -167,15 +173,22 @@ pub(super) fn read(inputs: &[DetectionsInput], results: &[SuiteResult]) -> Resul
     errors.sort_by_cached_key(|error| {
         let model = order::model(&error.variant, &error.parts, false);
         let suite = (place_of(&error.suite), error.suite.clone());
-        (suite, error.experiment.clone(), model, -error.train_tasks, error.in_sight)
+        (suite, error.experiment.clone(), model, error.tag.clone(), -error.train_tasks, error.in_sight)
     });
     Ok(errors)
 }
 
-/// Whether the paper's detector looked for the same things.
+/// Whether the paper's detector looked for the same things, and this model was not trained otherwise on purpose.
 fn is_the_papers(result: &SuiteResult) -> bool {
     let is_family = result.facts.family.as_deref() == Some(BLOCK_STACKING);
-    is_family && result.facts.blocks == Some(DETECTOR_BLOCKS)
+    is_family && result.facts.blocks == Some(DETECTOR_BLOCKS) && result.actor.tag.is_none()
+}
+
+impl DetectionError {
+    /// The variant, and the tag where there is one.
+    pub(super) fn model(&self) -> String {
+        model_name(&self.variant, "", self.tag.as_deref())
+    }
 }
 
 impl Errors {
@@ -193,7 +206,7 @@ impl Errors {
         self.distances.push((length * MICROMETRES).round() as i64);
     }
 
-    fn summed(mut self, (suite, experiment, variant, train_tasks, in_sight): Key) -> DetectionError {
+    fn summed(mut self, (suite, experiment, variant, tag, train_tasks, in_sight): Key) -> DetectionError {
         self.distances.sort_unstable();
         let n = self.distances.len().max(1) as f64;
         let cm = |micrometres: f64| micrometres / PER_CM;
@@ -208,6 +221,7 @@ impl Errors {
             experiment,
             variant,
             parts: ModelParts::default(),
+            tag,
             train_tasks,
             suite,
             seeds: self.seeds.len() as u64,

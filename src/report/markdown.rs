@@ -128,7 +128,7 @@ fn detection(error: &DetectionError, names: &SuiteNames) -> Vec<String> {
     let [x, y, z] = error.mean_absolute_cm;
     vec![
         names.tell(&error.suite, &error.experiment),
-        error.variant.clone(),
+        error.model(),
         error.train_tasks.to_string(),
         error.seeds.to_string(),
         error.in_sight.words().to_owned(),

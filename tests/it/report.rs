@@ -319,7 +319,7 @@ fn detections_become_errors_in_centimetres_by_what_is_in_sight() {
     let mut run = Run::new(&ten_rollouts());
     let path = run.folder.path().join("rollouts/all/detections.parquet");
     write_parquet(&path, detections_table());
-    run.inputs.detections = vec![DetectionsInput { experiment: "ten".to_owned(), path }];
+    run.inputs.detections = vec![DetectionsInput { experiment: "ten".to_owned(), tag: None, path }];
     let report = run.make();
     let parts: Vec<InSight> = report.detections.iter().map(|error| error.in_sight).collect();
     assert_eq!(parts, [InSight::All, InSight::Full, InSight::Part]);
@@ -336,6 +336,25 @@ fn detections_become_errors_in_centimetres_by_what_is_in_sight() {
         assert!(run.text(file).contains(told), "{file}");
     }
     assert!(report.inputs.iter().any(|input| input.path.ends_with("detections.parquet")));
+}
+
+#[test]
+fn detectors_that_a_tag_tells_apart_have_rows_of_their_own() {
+    let mut run = Run::new(&ten_rollouts());
+    let path = run.folder.path().join("rollouts/all/detections.parquet");
+    write_parquet(&path, detections_table());
+    let of = |tag: Option<&str>| DetectionsInput {
+        experiment: "ten".to_owned(),
+        tag: tag.map(str::to_owned),
+        path: path.clone(),
+    };
+    run.inputs.detections = vec![of(Some("wrist")), of(None)];
+    let report = run.make();
+    let all = report.detections.iter().filter(|error| error.in_sight == InSight::All);
+    let told: Vec<_> = all.map(|error| (error.tag.as_deref(), error.detections)).collect();
+    assert_eq!(told, [(None, 4), (Some("wrist"), 4)]);
+    assert!(run.text("report.md").contains("| ntp_vid_detector (wrist) |"));
+    assert!(run.text("index.html").contains("ntp_vid_detector (wrist)"));
 }
 
 #[test]

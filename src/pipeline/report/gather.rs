@@ -59,15 +59,16 @@ fn gather(
     let experiment = &pipeline.spec.name;
     for unit in acted {
         let dir = unit.dir(run);
+        let tag = unit.actor.and_then(|actor| actor.model.spec.tag.clone());
         inputs.rollouts.push(RolloutsInput {
             experiment: experiment.clone(),
-            tag: unit.actor.and_then(|actor| actor.model.spec.tag.clone()),
+            tag: tag.clone(),
             noise: unit.spec.noise,
             path: dir.path().join(rollout::TABLE),
         });
         if dir.finished()?.files.iter().any(|file| file.path == detections::TABLE) {
             let path = dir.path().join(detections::TABLE);
-            inputs.detections.push(DetectionsInput { experiment: experiment.clone(), path });
+            inputs.detections.push(DetectionsInput { experiment: experiment.clone(), tag, path });
         }
     }
     inputs.annotations.extend(annotations(pipeline, run).into_iter().map(|(name, path)| {

@@ -48,7 +48,7 @@ fn row(error: &DetectionError, names: &SuiteNames) -> DetectionRow {
     let cm = |value: f64| format!("{value:.2}");
     DetectionRow {
         suite: names.tell(&error.suite, &error.experiment),
-        variant: error.variant.clone(),
+        variant: error.model(),
         color: error.parts.color(false),
         tasks: thousands(error.train_tasks.max(0) as u64),
         seeds: error.seeds,
