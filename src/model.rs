@@ -74,6 +74,7 @@ pub use flattened::{FlatDemonstration, FlatEncoder, FlatReading, Flattened};
 pub use instructed::{Instructed, InstructedConfig, InstructedReading, Sentences};
 pub use keypoints::{CellLooks, GlimpseNaming, Keypoints, KeypointsConfig};
 pub use limits::ConfigError;
+pub(crate) use limits::MOST_CAMERAS;
 pub use linear::Linear;
 pub use memory::ProgramMemory;
 pub use network::{CalledWith, CoreOutput, Network};
@@ -88,6 +89,7 @@ pub use scoping::ScopeHead;
 pub use scoping_kind::{MAX_ARGUMENTS, ScopingKind};
 pub use sighted::{Naming, PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
 pub use specification_rows::{SpecificationRows, States};
+pub(crate) use store::cameras;
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,

@@ -186,7 +186,7 @@ pub fn train_at(
     check_pictures(training.variant, size)?;
     let training = training.resolved();
     let facts = source.facts()?;
-    let model = model(&training, &facts, size, folder)?;
+    let model = ModelConfig { cameras: source.cameras(), ..model(&training, &facts, size, folder)? };
     if !on.is_cpu() {
         facts.check_one_family(&format!("{} on {on}", training.variant))?;
     }

@@ -262,6 +262,10 @@ pub struct ModelConfig {
     /// The tasks that it knows by name, where it knows any: those of [`ScopingKind::Arguments`], in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tasks: Vec<String>,
+    /// The names of the cameras that it looks with, the first one first; none where it sees nothing, or where nobody named
+    /// them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<String>,
     /// Widths.
     pub network: NetworkConfig,
     /// How it was trained, for people; loading does not read it.
@@ -297,6 +301,7 @@ impl ModelConfig {
             vocabulary: family.programs().hash(),
             shared_root: false,
             tasks: Vec::new(),
+            cameras: Vec::new(),
             network: NetworkConfig::of(variant, specification),
             training,
             trained_on: None,
@@ -353,12 +358,15 @@ impl ModelConfig {
     pub fn check(&self) -> Result<(), ConfigError> {
         let Self { version: _, variant, family: _, other_families, n_slots, vocabulary: _, shared_root, tasks, .. } =
             self;
-        let Self { network, training: _, trained_on: _, .. } = self;
+        let Self { network, cameras, training: _, trained_on: _, .. } = self;
         check_sizes(&[("n_slots", *n_slots)])?;
         ConfigError::unless(network.is_for(*variant), "network", network.name(), "widths of the variant's encoder")?;
         let knows_tasks = variant.scoping() == ScopingKind::Arguments;
         let allowed = "none but for scoping arguments, which knows tasks by name";
         ConfigError::unless(knows_tasks || tasks.is_empty(), "tasks", tasks.len(), allowed)?;
+        let are_all = cameras.is_empty() || cameras.len() == network.cameras();
+        let allowed = "as many names as the network has cameras, or none";
+        ConfigError::unless(are_all, "cameras", format!("{cameras:?}"), allowed)?;
         let reads_any =
             matches!(network, NetworkConfig::ObjectCentric(_) | NetworkConfig::Flattened(_)) && !knows_tasks;
         let allowed = "none but for networks that read positions and a specification";

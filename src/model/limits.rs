@@ -5,7 +5,7 @@ const LARGEST: usize = 65_536;
 /// The longest kernel.
 const LONGEST: usize = 1001;
 /// The most cameras that a network sees with.
-const MOST_CAMERAS: usize = 16;
+pub(crate) const MOST_CAMERAS: usize = 16;
 
 /// A configuration that makes no sense.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

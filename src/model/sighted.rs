@@ -19,6 +19,8 @@
 //! The form of [`super::object_centric`], in the picture's plane. Which percept is which object nobody says: the layer
 //! that names the argument learns it.
 
+mod eye;
+
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::activation::{leaky_relu, relu};
 use burn::tensor::{Device, Tensor};
@@ -31,20 +33,12 @@ use crate::model::linear::Linear;
 use crate::model::perception::{Looks as _, PERCEPT_WIDTH, Perception};
 use crate::model::pictures::{PictureIndex, PictureSample, Pictures, picked};
 use crate::model::read_error::ReadError;
+use crate::model::sighted::eye::{Eye, OBJECT_WIDTH, Other, PLACE_WIDTH, Seen};
 use crate::model::specification_rows::States;
 use crate::model::summary::summarize;
 use crate::model::windows::{Padding, Windows};
 use crate::seed::Seed;
 use crate::trace::Span;
-
-/// Features of a place or displacement in the picture: two linear, two bumps at zero.
-const PLACE_WIDTH: usize = 4;
-/// Features of a percept: how it lies to the robot, where it is, how it looks, and how the robot looks.
-const OBJECT_WIDTH: usize = PLACE_WIDTH + 2 * PERCEPT_WIDTH;
-/// Scale of the linear features, per half picture.
-const LINEAR_GAIN: f32 = 3.0;
-/// A bump has fallen to 1/e at about the width of a block.
-const BUMP_GAIN: f32 = 8.0;
 
 /// Weights of the layer that names the argument lie within this bound to begin with: logits then differ by about one. With
 /// small ones a percept's features get no gradient before names are tied to percepts, nor names before features tell the
@@ -115,38 +109,6 @@ pub struct Sighted<P: Module> {
     others: Vec<Other<P>>,
 }
 
-/// What belongs to a camera behind the first.
-#[derive(Module, Debug)]
-struct Other<P: Module> {
-    perception: P,
-    pair_demonstration: Linear,
-    pair_state: Linear,
-    object_seen: Mlp,
-    state: Mlp,
-}
-
-/// What belongs to a camera.
-struct Eye<'e, P> {
-    perception: &'e P,
-    pair_demonstration: &'e Linear,
-    pair_state: &'e Linear,
-    object_seen: &'e Mlp,
-    state: &'e Mlp,
-}
-
-/// What a camera's pictures give by themselves.
-struct Seen<L> {
-    /// `[F, K * K, pair]` each.
-    pairs: [Tensor<3>; 2],
-    /// `[F, K, H]`
-    objects: Tensor<3>,
-    /// Most of the percepts, `[F, H]`.
-    state: Tensor<2>,
-    /// `[F, PERCEPT_WIDTH]`
-    robot: Tensor<2>,
-    looks: L,
-}
-
 /// A perception whose finds are given the names of slots.
 pub trait Naming: Perception {
     /// How an object is named by what is found.
@@ -208,38 +170,12 @@ pub struct SightedReading<L> {
     pub(crate) ends: Vec<[L; 2]>,
 }
 
-impl<P: Perception> Eye<'_, P> {
-    fn see(&self, pictures: &Pictures) -> Result<Seen<P::Looks>, ReadError> {
-        let (seen, looks) = self.perception.look(pictures)?; // [F, K, PERCEPT_WIDTH]
-        let [n_pictures, n_percepts, _] = seen.dims();
-        let places = seen.clone().narrow(2, 0, 2);
-        let robot = seen.clone().narrow(1, 0, 1); // [F, 1, PERCEPT_WIDTH]
-        let relative = place_features(places.clone() - robot.clone().narrow(2, 0, 2));
-        let appearance = seen * LINEAR_GAIN;
-        let robots = (robot * LINEAR_GAIN).expand([n_pictures, n_percepts, PERCEPT_WIDTH]);
-        let objects = Tensor::<3>::cat(vec![relative, appearance, robots.clone()], 2);
-        let columns: Tensor<4> = places.clone().unsqueeze_dim(1);
-        let rows: Tensor<4> = places.unsqueeze_dim(2);
-        let pairs = place_features(rows - columns).reshape([n_pictures, n_percepts * n_percepts, PLACE_WIDTH]);
-        Ok(Seen {
-            pairs: [self.pair_demonstration.forward(pairs.clone()), self.pair_state.forward(pairs)],
-            objects: self.object_seen.forward(objects.clone()),
-            state: self.state.forward(objects).max_dim(1).squeeze_dim(1),
-            robot: robots.narrow(1, 0, 1).squeeze_dim(1),
-            looks,
-        })
-    }
-}
-
 impl<P: Perception> Sighted<P> {
     /// From the first camera to the last.
     fn eyes(&self) -> impl Iterator<Item = Eye<'_, P>> {
         let Self { perception, pair_demonstration, pair_state, object_seen, state, .. } = self;
         let first = Eye { perception, pair_demonstration, pair_state, object_seen, state };
-        std::iter::once(first).chain(self.others.iter().map(|other| {
-            let Other { perception, pair_demonstration, pair_state, object_seen, state } = other;
-            Eye { perception, pair_demonstration, pair_state, object_seen, state }
-        }))
+        std::iter::once(first).chain(self.others.iter().map(|other| other.eye()))
     }
 
     /// Each percept in each frame, compared with its pairs and itself now: `[B, T, C * K, H]`.
@@ -283,15 +219,7 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
             object: init.linear(width, width),
             state: init.mlp(&[OBJECT_WIDTH, width, width]),
             scope_conv: init.temporal_conv(scope_kernel, width, width),
-            others: (1..cameras)
-                .map(|_| Other {
-                    perception: P::new(&perception, init),
-                    pair_demonstration: init.part(PLACE_WIDTH, pair_width, 2 * PLACE_WIDTH),
-                    pair_state: init.linear(PLACE_WIDTH, pair_width),
-                    object_seen: init.mlp(&[OBJECT_WIDTH, width, width]),
-                    state: init.mlp(&[OBJECT_WIDTH, width, width]),
-                })
-                .collect(),
+            others: (1..cameras).map(|_| Other::new(config, init)).collect(),
         }
     }
 
@@ -304,9 +232,8 @@ impl<P: Naming + ModuleDisplay> Encoder for Sighted<P> {
     fn calibrated(mut self, sample: &PictureSample, seed: Seed) -> Result<Self, ReadError> {
         let n_cameras = self.others.len() + 1;
         let others = self.others.into_iter().enumerate().map(|(number, other)| {
-            let sample = sample.of_camera(number + 1, n_cameras);
-            let seed = seed.derive("camera", &[number as u64 + 1]);
-            Ok(Other { perception: other.perception.calibrated(&sample, seed)?, ..other })
+            let camera = number + 1;
+            other.calibrated(&sample.of_camera(camera, n_cameras), seed.derive("camera", &[camera as u64]))
         });
         self.others = others.collect::<Result<_, ReadError>>()?;
         self.perception = self.perception.calibrated(&sample.of_camera(0, n_cameras), seed)?;
@@ -437,10 +364,4 @@ impl<P: Naming> ArgumentDecoder<Sighted<P>> for PerceptNaming {
         let told = leaky_relu(object + context.unsqueeze_dim(1), NAMING_LEAK);
         self.slots.forward(told.flatten::<2>(1, 2))
     }
-}
-
-/// Linear and bump features of the last dimension's two coordinates.
-fn place_features<const D: usize>(places: Tensor<D>) -> Tensor<D> {
-    let bumps = (places.clone() * BUMP_GAIN).powf_scalar(2.0).neg().exp();
-    Tensor::cat(vec![places * LINEAR_GAIN, bumps], D - 1)
 }

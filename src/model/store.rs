@@ -61,7 +61,7 @@ pub enum ModelError {
     /// The model is for other scenes.
     #[error("model is for {field} {found}, but {expected} is asked for: {}", path.display())]
     Purpose {
-        /// `variant`, `family`, `specification`, `n_slots` or `pictures`.
+        /// `variant`, `family`, `specification`, `n_slots`, `pictures` or `cameras`.
         field: &'static str,
         /// As found.
         found: String,
@@ -194,6 +194,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
         ("n_slots", n_slots.to_string(), wanted.n_slots.to_string()),
         ("pictures", pixels(config), pixels(wanted)),
+        ("cameras", cameras(config, wanted), cameras(wanted, config)),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
         Some((field, found, expected)) => {
@@ -201,6 +202,12 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         }
         None => Ok(()),
     }
+}
+
+/// The cameras of one of two models; as of the other where nobody named them.
+pub(crate) fn cameras(of: &ModelConfig, other: &ModelConfig) -> String {
+    let names = if of.cameras.is_empty() { &other.cameras } else { &of.cameras };
+    names.join(", ")
 }
 
 fn pixels(config: &ModelConfig) -> String {

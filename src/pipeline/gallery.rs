@@ -14,8 +14,8 @@ const MOST_BYTES: usize = 1 << 28;
 
 /// The pictures of a dataset's trials, decoded while a step is computed.
 pub(super) struct Streamed {
-    /// Of each camera.
-    loaders: Vec<PictureLoader>,
+    /// Of each camera, by name.
+    loaders: Vec<(String, PictureLoader)>,
     /// The gripper in each frame of each trial.
     grippers: Vec<Vec<GripperState>>,
 }
@@ -40,7 +40,10 @@ impl<'p> OfBuffers<'p> {
         let most_bytes = MOST_BYTES / self.cameras.len().max(1);
         let rows =
             || trials.trials.iter().map(|of| EpisodeRows { episode: of.episode, rows: of.rows.clone() }).collect();
-        let loader = |camera: &&CameraConfig| PictureLoader::open(&self.dataset, &camera.name, rows(), most_bytes);
+        let loader = |camera: &&CameraConfig| {
+            let loader = PictureLoader::open(&self.dataset, &camera.name, rows(), most_bytes)?;
+            Ok::<_, DatasetError>((camera.name.clone(), loader))
+        };
         Ok(Streamed {
             loaders: self.cameras.iter().map(loader).collect::<Result<_, _>>()?,
             grippers: trials.trials.iter().map(|of| of.grippers.clone()).collect(),
@@ -53,6 +56,10 @@ impl Galleries for OfBuffers<'_> {
         size(self.cameras.iter().map(|camera| camera.size_px))
     }
 
+    fn cameras(&self) -> Vec<String> {
+        self.cameras.iter().map(|camera| camera.name.clone()).collect()
+    }
+
     fn open(&self, trials: &DatasetTrials) -> Result<Box<dyn Gallery>, TrainError> {
         Ok(Box::new(self.find(trials)?))
     }
@@ -60,11 +67,15 @@ impl Galleries for OfBuffers<'_> {
 
 impl Gallery for Streamed {
     fn size(&self) -> (usize, usize) {
-        size(self.loaders.iter().map(PictureLoader::size_px))
+        size(self.loaders.iter().map(|(_, loader)| loader.size_px()))
+    }
+
+    fn cameras(&self) -> Vec<String> {
+        self.loaders.iter().map(|(name, _)| name.clone()).collect()
     }
 
     fn fetch(&self, wanted: &Wanted, into: &mut Pictures) -> Result<(), String> {
-        let of_camera = |loader: &PictureLoader| loader.get(wanted).map_err(|error| error.to_string());
+        let of_camera = |(_, loader): &(String, PictureLoader)| loader.get(wanted).map_err(|error| error.to_string());
         let cameras = self.loaders.iter().map(of_camera).collect::<Result<Vec<_>, _>>()?;
         for (number, &frame) in wanted.frames.iter().enumerate() {
             let gripper = self.grippers.get(wanted.position).and_then(|grippers| grippers.get(frame));
@@ -81,7 +92,7 @@ impl Gallery for Streamed {
     }
 
     fn announce(&self, wanted: &[Wanted]) {
-        self.loaders.iter().for_each(|loader| loader.announce(wanted));
+        self.loaders.iter().for_each(|(_, loader)| loader.announce(wanted));
     }
 }
 

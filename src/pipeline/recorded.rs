@@ -27,6 +27,9 @@ pub(super) struct RolloutSettings {
     pub(super) record: u32,
     #[serde(default)]
     pub(super) cameras: Vec<CameraConfig>,
+    /// The names of those that the model looks with.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) looks_with: Vec<String>,
     pub(super) decisions_factor: f32,
     pub(super) simulation: SimulationConfig,
     /// How many of a seen suite's tasks the model was trained on; left out for all.

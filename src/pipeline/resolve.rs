@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 use crate::artifact;
-use crate::model::Decoder;
+use crate::model::{Decoder, MOST_CAMERAS};
 use crate::perception::PerceptionConfig;
 use crate::pipeline::trials::DEFAULT_COUNTS;
 use crate::pipeline::{CountsSpec, ModelSpec, OrderSpec, PipelineError, PipelineSpec, SuiteSpec};
 use crate::render::CameraConfig;
 use crate::task::{Family, Layout, Split};
+use crate::words::counted;
 
 /// So many tasks are held out at most when the pipeline file says nothing.
 const MAX_DEFAULT_UNSEEN: u32 = 1000;
@@ -153,16 +154,28 @@ impl Pipeline {
             return Err(self.value(key, format!("{} has no categories; leave it out", family.name())));
         };
         if min < 1 || max > most || min > max {
-            let place = match layout {
-                Layout::Table => "the table",
-                Layout::Bench => "an arm's bench",
-            };
             let problem = format!(
-                "is {min} to {max}; allowed is 1 <= min <= max <= {most}, as many as {place} holds of one category"
+                "is {min} to {max}; allowed is 1 <= min <= max <= {most}, as many as {} holds of one category",
+                place(layout)
             );
             return Err(self.value(key, problem));
         }
         Ok(())
+    }
+
+    /// Where a suite does not say how many things there are, it has as many as `generate` demonstrates.
+    fn check_room(&self, key: &str, generated: Option<CountsSpec>, layout: Layout) -> Result<(), PipelineError> {
+        let most = self.spec.tasks.family.max_instances(layout);
+        match (generated, most) {
+            (Some(CountsSpec { max, .. }), Some(most)) if max > most => {
+                let problem = format!(
+                    "is left out, so that up to {max} of one category are there, as in generate.counts; {} holds {most}",
+                    place(layout)
+                );
+                Err(self.value(key, problem))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// How many things are demonstrated, and how many lie where the robot acts: as many as are demonstrated where nothing
@@ -174,7 +187,7 @@ impl Pipeline {
         match (suite.on_table, suite.demonstrated) {
             (Some(on_table), _) => self.check_counts(&key("on_table"), Some(on_table), acted),
             (None, Some(demonstrated)) => self.check_counts(&key("demonstrated"), Some(demonstrated), acted),
-            (None, None) => self.check_counts(&key("layout"), generate.counts, acted),
+            (None, None) => self.check_room(&key("on_table"), generate.counts, acted),
         }
     }
 
@@ -202,6 +215,7 @@ impl Pipeline {
                 return Err(self.value(&format!("models[{idx}].training"), problem.to_string()));
             }
             self.check_seeing(idx, model)?;
+            self.check_start(idx, model)?;
             self.check_acting(idx, model)?;
         }
         Ok(())
@@ -213,33 +227,65 @@ impl Pipeline {
         let there = &self.spec.generate.cameras;
         let names = || there.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
         if !model.variant.sees() {
-            let problem = format!("is there for {}, which sees nothing; leave it out", model.variant);
-            return if model.cameras.is_empty() { Ok(()) } else { refuse("cameras", problem) };
+            let problem = || format!("{} reads positions and looks with no camera; leave it out", model.variant);
+            return if model.cameras.is_none() { Ok(()) } else { refuse("cameras", problem()) };
         }
         if there.is_empty() {
             let problem = "it sees with cameras, and there are none in generate.cameras";
             return refuse("variant", format!("is {}; {problem}", model.variant));
         }
-        if let Some(twice) = first_repeated(&model.cameras) {
+        let asked = model.cameras.as_deref().unwrap_or_default();
+        if model.cameras.is_some() && asked.is_empty() {
+            return refuse("cameras", format!("is empty; there are {}", names()));
+        }
+        if let Some(twice) = first_repeated(asked) {
             return refuse("cameras", format!("{twice:?} is there twice"));
         }
-        if let Some(unknown) = model.cameras.iter().find(|name| there.iter().all(|camera| camera.name != **name)) {
+        if let Some(unknown) = asked.iter().find(|name| there.iter().all(|camera| camera.name != **name)) {
             return refuse("cameras", format!("{unknown:?} is no camera of generate.cameras; there are {}", names()));
         }
-        if model.variant.detects() && model.cameras.len() > 1 {
-            let problem = format!("are {}; a detector looks with one", model.cameras.join(", "));
+        let (most, whose) = if model.variant.detects() { (1, "a detector") } else { (MOST_CAMERAS, "a model") };
+        if asked.len() > most {
+            let problem = format!("names {}; {whose} looks with {most} at most", counted(asked.len(), "camera"));
             return refuse("cameras", problem);
         }
         let looks_with = model.looks_with(&self.spec.generate);
-        let size = looks_with[0].size_px;
-        let is_other = |camera: &&&CameraConfig| camera.size_px != size || size[0] != size[1];
-        match looks_with.iter().find(is_other) {
+        let [width, height] = looks_with[0].size_px;
+        match looks_with.iter().find(|camera| camera.size_px != [width; 2]) {
             None => Ok(()),
-            Some(CameraConfig { name, size_px: [width, height], .. }) => {
-                let allowed = "as wide as high, and all of one size";
-                refuse("cameras", format!("{name} has {width} x {height} pixels; allowed are pictures {allowed}"))
+            Some(_) if width != height => {
+                let problem = format!("{} has {width} x {height} pixels", looks_with[0].name);
+                refuse("cameras", format!("{problem}; allowed are pictures as wide as high"))
+            }
+            Some(CameraConfig { name, size_px: [across, down], .. }) => {
+                let first = format!("{} has {width} x {height} pixels", looks_with[0].name);
+                refuse("cameras", format!("{name} has {across} x {down} pixels, and {first}; allowed is one size"))
             }
         }
+    }
+
+    /// Weights of another model of this file fit a network of the same variant that looks with the same cameras.
+    fn check_start(&self, idx: usize, model: &ModelSpec) -> Result<(), PipelineError> {
+        let Some(start_from) = &model.training.start_from else { return Ok(()) };
+        let is_it = |other: &&ModelSpec| {
+            other.seeds.iter().any(|&seed| {
+                start_from.to_str() == Some(format!("models/{}", super::layout::model_name(other, seed)).as_str())
+            })
+        };
+        let Some(other) = self.spec.models.iter().find(is_it) else { return Ok(()) };
+        let cameras = |model: &ModelSpec| model.camera_names(&self.spec.generate).join(", ");
+        let key = format!("models[{idx}].training.start_from");
+        if other.variant != model.variant {
+            let problem =
+                format!("is {}, of variant {}; allowed is {}", start_from.display(), other.variant, model.variant);
+            return Err(self.value(&key, problem));
+        }
+        if cameras(other) != cameras(model) {
+            let (found, allowed) = (cameras(other), cameras(model));
+            let problem = format!("is {}, which looks with {found}; allowed is {allowed}", start_from.display());
+            return Err(self.value(&key, problem));
+        }
+        Ok(())
     }
 
     /// How a model acts, and what.
@@ -334,6 +380,14 @@ impl Pipeline {
             }
             None => Ok(()),
         }
+    }
+}
+
+/// Where things lie, in words.
+fn place(layout: Layout) -> &'static str {
+    match layout {
+        Layout::Table => "the table",
+        Layout::Bench => "an arm's bench",
     }
 }
 

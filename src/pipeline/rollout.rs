@@ -154,6 +154,7 @@ impl Unit for Suite<'_> {
             decoder: self.actor.map(|actor| actor.decoder),
             record: spec.rollout.record,
             cameras: spec.generate.cameras.clone(),
+            looks_with: self.actor.map(|actor| actor.model.spec.camera_names(&spec.generate)).unwrap_or_default(),
             decisions_factor: spec.rollout.decisions_factor,
             simulation: spec.generate.simulation.clone(),
             trained_on: self.trained_on(),
@@ -233,8 +234,8 @@ fn learned(run: &RunDir, ModelActor { model, decoder }: ModelActor<'_>) -> Learn
 }
 
 impl Learned {
-    /// Refuses a model that was made for another family, another number of slots, pictures of another size, or as
-    /// another variant.
+    /// Refuses a model that was made for another family, another number of slots, pictures of another size or of other
+    /// cameras, or as another variant.
     fn policy(&self, pipeline: &Pipeline, device: ComputeDevice) -> Result<Box<dyn Policy>, PipelineError> {
         let found = load_config(&self.folder)?;
         let family = pipeline.spec.tasks.family;
@@ -244,6 +245,7 @@ impl Learned {
         let cameras = self.spec.looks_with(&pipeline.spec.generate);
         if let Some(camera) = cameras.first() {
             wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, cameras.len(), wanted.n_slots);
+            wanted.cameras = self.spec.camera_names(&pipeline.spec.generate);
         }
         check_purpose(&found, &wanted, &self.folder)?;
         Ok(load_policy_on(&device.open()?, &self.folder, self.decoder)?.1)

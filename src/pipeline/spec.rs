@@ -85,7 +85,7 @@ pub enum RecordedFrames {
 pub struct CountsSpec {
     /// At least; from 1.
     pub min: u16,
-    /// At most; to 10, forks to 20.
+    /// At most: 20, and 10 of what is sorted before an arm.
     pub max: u16,
 }
 
@@ -141,10 +141,11 @@ pub struct ModelSpec {
     /// Train on the first so many training tasks (of each experiment); all when left out.
     #[serde(default)]
     pub train_tasks: Option<u32>,
-    /// For a variant that sees: the names of the cameras that it looks with, in demonstrations and when it acts; the first of
-    /// `generate.cameras` when left out. All have pictures of one size, as wide as high. A detector looks with one.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cameras: Vec<String>,
+    /// For a variant that sees: the names of the cameras that it looks with, in demonstrations and when it acts, 16 at most;
+    /// the first of `generate.cameras` when left out. All have pictures of one size, as wide as high. A detector looks with
+    /// one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<Vec<String>>,
     /// What it reads as task specification: trajectories, or for variant `ntp` also instructions.
     #[serde(default)]
     pub specification: SpecificationForm,
@@ -185,11 +186,16 @@ impl ModelSpec {
         if !self.variant.sees() {
             return Vec::new();
         }
-        if self.cameras.is_empty() {
-            return generate.cameras.first().into_iter().collect();
-        }
         let named = |name: &String| generate.cameras.iter().find(|camera| camera.name == *name);
-        self.cameras.iter().filter_map(named).collect()
+        match &self.cameras {
+            None => generate.cameras.first().into_iter().collect(),
+            Some(names) => names.iter().filter_map(named).collect(),
+        }
+    }
+
+    /// The same by name.
+    pub(super) fn camera_names(&self, generate: &GenerateSpec) -> Vec<String> {
+        self.looks_with(generate).into_iter().map(|camera| camera.name.clone()).collect()
     }
 
     /// One of its training runs.

@@ -210,7 +210,7 @@ impl Study {
             let allowed = "allowed are variants that read positions and a demonstration of them";
             return refuse("variant", format!("is {}; {allowed}", model.variant));
         }
-        if !model.cameras.is_empty() {
+        if model.cameras.is_some() {
             return refuse("cameras", "is of models that see; a study's own read positions".to_owned());
         }
         if model.specification() == SpecificationForm::Instructions {

@@ -159,11 +159,12 @@ impl Unit for Model<'_> {
         if self.spec.variant.detects() {
             settings["detector_given"] = json!("gripper");
         }
-        if !self.spec.cameras.is_empty() {
-            settings["cameras"] = json!(self.spec.cameras);
-        }
-        if let LearnsFrom::Study(_) = self.source {
-            settings["experiments"] = json!(self.spec.experiments);
+        match self.source {
+            LearnsFrom::Experiment(pipeline) if self.spec.variant.sees() => {
+                settings["cameras"] = json!(self.spec.camera_names(&pipeline.spec.generate));
+            }
+            LearnsFrom::Experiment(_) => {}
+            LearnsFrom::Study(_) => settings["experiments"] = json!(self.spec.experiments),
         }
         if self.spec.core() != CoreKind::Reactive {
             settings["cell_inputs"] = json!("of all steps at once");

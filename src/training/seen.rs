@@ -30,6 +30,11 @@ pub trait Gallery: Sync {
     /// Pixels across and down each picture.
     fn size(&self) -> (usize, usize);
 
+    /// The names of the cameras, the uppermost first; none where nobody named them.
+    fn cameras(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Adds pictures of a trial's frames, in order, each with the gripper's state.
     ///
     /// # Errors
@@ -47,6 +52,9 @@ pub trait Gallery: Sync {
 pub trait Galleries: Sync {
     /// Pixels across and down each picture.
     fn size(&self) -> (usize, usize);
+
+    /// The names of the cameras, the uppermost first.
+    fn cameras(&self) -> Vec<String>;
 
     /// The pictures of these trials.
     ///

@@ -43,6 +43,14 @@ impl Source<'_> {
         }
     }
 
+    /// The names of the cameras that took them.
+    pub(super) fn cameras(&self) -> Vec<String> {
+        match self {
+            Self::Here(_, gallery) => gallery.map(Gallery::cameras).unwrap_or_default(),
+            Self::Streamed(_, galleries) => galleries.map(Galleries::cameras).unwrap_or_default(),
+        }
+    }
+
     /// The same for a variant that does not see.
     pub(super) fn without_pictures(self) -> Self {
         match self {

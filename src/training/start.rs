@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::module::Module;
 
 use crate::artifact;
-use crate::model::{ModelConfig, ModelError, WEIGHTS_FILE, load_config, weights_from_bytes};
+use crate::model::{ModelConfig, ModelError, WEIGHTS_FILE, cameras, load_config, weights_from_bytes};
 use crate::training::TrainError;
 
 /// Weights to begin with.
@@ -38,9 +38,11 @@ impl Start {
 /// The first thing that makes another network of a model; as found and as it should be.
 fn difference(found: &ModelConfig, wanted: &ModelConfig) -> Option<(&'static str, String, String)> {
     let widths = |model: &ModelConfig| serde_json::to_string(&model.network).unwrap_or_default();
-    let facts = |model: &ModelConfig| {
+    let facts = |model: &ModelConfig, other: &ModelConfig| {
         [
             ("variant", model.variant.to_string()),
+            ("number of cameras", model.network.cameras().to_string()),
+            ("list of cameras", cameras(model, other)),
             ("network", widths(model)),
             ("n_slots", model.n_slots.to_string()),
             ("vocabulary", model.vocabulary.clone()),
@@ -48,6 +50,6 @@ fn difference(found: &ModelConfig, wanted: &ModelConfig) -> Option<(&'static str
             ("tasks", model.tasks.join(", ")),
         ]
     };
-    let pairs = facts(found).into_iter().zip(facts(wanted));
+    let pairs = facts(found, wanted).into_iter().zip(facts(wanted, found));
     pairs.map(|((field, found), (_, wanted))| (field, found, wanted)).find(|(_, found, wanted)| found != wanted)
 }

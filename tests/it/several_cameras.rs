@@ -161,16 +161,37 @@ fn a_model_looks_with_the_cameras_that_it_names_and_with_the_first_where_it_name
     let [first, front, wrist] =
         folders.each_ref().map(|folder| std::fs::read(folder.join("model.safetensors")).unwrap());
     assert!(first == front && front != wrist);
-    // Asked for two cameras, the model of one is refused.
-    let two = model("ntp_vid_e2e", "two", "cameras = [\"front\", \"wrist\"]");
-    let [pipeline, out] = written(folder.path(), &[two]);
-    assert_eq!(run(&["run", &pipeline, "--out", &out, "--to", "train"]).0, 0);
-    let trained = folder.path().join("run/models/ntp_vid_e2e-two-seed0");
-    std::fs::remove_dir_all(&trained).unwrap();
-    std::fs::rename(&folders[0], &trained).unwrap();
-    let (code, _, stderr) = run(&["rollout", &pipeline, "--out", &out]);
-    assert_eq!(code, 1, "{stderr}");
-    assert!(stderr.contains("of 32x32 pixels, but of 32x32 pixels from 2 cameras is asked for"), "{stderr}");
+    let named = std::fs::read_to_string(folders[0].join("config.json")).unwrap();
+    assert!(named.contains("\"cameras\": [\n    \"front\"\n  ]"), "{named}");
+}
+
+#[test]
+fn a_model_acts_with_no_other_cameras_than_those_that_it_learned_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |cameras: &str| model("ntp_vid_e2e", "seen", cameras);
+    let refused = |cameras: &str, said: &str| {
+        let [pipeline, out] = written(folder.path(), &[of(cameras)]);
+        let (code, _, stderr) = run(&["rollout", &pipeline, "--out", &out, "--force"]);
+        assert!(code == 1 && stderr.contains(said), "{stderr}");
+    };
+    let [pipeline, out] = written(folder.path(), &[of(r#"cameras = ["front", "wrist"]"#)]);
+    let (code, _, stderr) = run(&["run", &pipeline, "--out", &out]);
+    assert_eq!(code, 0, "{stderr}");
+    let acted = hashes(&folder.path().join("run"), &["models", "rollouts"]);
+    let swapped = r#"cameras = ["wrist", "front"]"#;
+    refused(swapped, "model is for cameras front, wrist, but wrist, front is asked for");
+    refused("", "of 32x32 pixels from 2 cameras, but of 32x32 pixels is asked for");
+    // What was acted with the model's own cameras is still that.
+    let [pipeline, out] = written(folder.path(), &[of(r#"cameras = ["front", "wrist"]"#)]);
+    assert_eq!(run(&["run", &pipeline, "--out", &out]).0, 0);
+    assert_eq!(hashes(&folder.path().join("run"), &["models", "rollouts"]), acted);
+    // Other cameras are another training, and other rollouts.
+    let [pipeline, out] = written(folder.path(), &[of(swapped)]);
+    let (_, told, _) = run(&["run", &pipeline, "--out", &out, "--dry-run"]);
+    for unit in ["train ntp_vid_e2e-seen-seed0", "rollout ntp_vid_e2e-seen-seed0-mss stacking_unseen"] {
+        let line = told.lines().find(|line| line.contains(unit)).unwrap();
+        assert!(!line.contains("up to date"), "{line}");
+    }
 }
 
 #[test]
@@ -188,12 +209,39 @@ fn cameras_that_a_model_cannot_look_with_are_refused_with_those_that_it_can() {
     let said = refused("ntp_vid_e2e", r#"["wrist", "wrist"]"#);
     assert!(said.contains("\"wrist\" is there twice"), "{said}");
     let said = refused("ntp_vid_e2e", r#"["front", "wide"]"#);
-    assert!(
-        said.contains("wide has 48 x 32 pixels; allowed are pictures as wide as high, and all of one size"),
-        "{said}"
-    );
+    assert!(said.contains("wide has 48 x 32 pixels, and front has 32 x 32 pixels; allowed is one size"), "{said}");
+    let said = refused("ntp_vid_e2e", r#"["wide"]"#);
+    assert!(said.contains("wide has 48 x 32 pixels; allowed are pictures as wide as high"), "{said}");
+    let said = refused("ntp_vid_e2e", "[]");
+    assert!(said.contains("is empty; there are front, wrist, wide"), "{said}");
     let said = refused("ntp_vid_detector", r#"["front", "wrist"]"#);
-    assert!(said.contains("are front, wrist; a detector looks with one"), "{said}");
+    assert!(said.contains("names 2 cameras; a detector looks with 1 at most"), "{said}");
     let said = refused("ntp", r#"["front"]"#);
-    assert!(said.contains("is there for ntp, which sees nothing; leave it out"), "{said}");
+    assert!(said.contains("ntp reads positions and looks with no camera; leave it out"), "{said}");
+}
+
+#[test]
+fn a_training_begins_with_no_weights_of_other_cameras() {
+    let start = "start_from = \"models/ntp_vid_e2e-first-seed0\"\n";
+    let models = |first: &str, second: &str| {
+        [model("ntp_vid_e2e", "first", first), model("ntp_vid_e2e", "second", second) + start]
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (one, both, swapped) = ("", r#"cameras = ["front", "wrist"]"#, r#"cameras = ["wrist", "front"]"#);
+    let said = "models[1].training.start_from: is models/ntp_vid_e2e-first-seed0, which looks with ";
+    for (first, second, cameras) in
+        [(one, both, "front; allowed is front, wrist"), (both, swapped, "front, wrist; allowed is wrist, front")]
+    {
+        let [pipeline, out] = written(folder.path(), &models(first, second));
+        let (code, _, stderr) = run(&["run", &pipeline, "--out", &out, "--dry-run"]);
+        assert!(code == 2 && stderr.contains(&format!("{said}{cameras}")), "{stderr}");
+    }
+    // Of a model elsewhere it is known when it is there.
+    let [pipeline, out] = written(folder.path(), &models(both, both));
+    assert_eq!(run(&["run", &pipeline, "--out", &out, "--to", "train"]).0, 0);
+    let elsewhere = start.replace("models/", "../run/models/");
+    let [pipeline, out] = written(folder.path(), &[model("ntp_vid_e2e", "third", swapped) + &elsewhere]);
+    let (code, _, stderr) = run(&["run", &pipeline, "--out", &out, "--to", "train"]);
+    let said = "whose list of cameras is front, wrist; allowed: wrist, front";
+    assert!(code == 1 && stderr.contains(said), "{stderr}");
 }
