@@ -6,6 +6,7 @@ use std::process::{Child, Stdio};
 use ntp::pipeline::{ItemRanges, Pipeline, RunDir, Stage, items};
 use serde_json::Value;
 
+use crate::killing::killed_after;
 use crate::length::{from_environment, tell};
 use crate::pipeline::{ALL, hashes, ntp, repository, run};
 use crate::smoke::{self, PIPELINE};
@@ -340,11 +341,9 @@ fn a_run_that_was_killed_in_its_items_is_carried_on_by_others() {
     let mut n_killed = 0;
     for (command, n_items) in [("train", 1), ("rollout", 2)] {
         for kill in 0..3 {
-            let mut child = start(command, folder.path(), &["--part", "0/1"]);
-            std::thread::sleep(smoke::lasted().mul_f64(0.03 * f64::from(kill + 1)));
-            n_killed += usize::from(child.try_wait().unwrap().is_none());
-            let _ended = child.kill();
-            child.wait().unwrap();
+            let child = start(command, folder.path(), &["--part", "0/1"]);
+            let wait = smoke::lasted().mul_f64(0.03 * f64::from(kill + 1));
+            n_killed += usize::from(killed_after(child, wait));
         }
         check_all_succeed(
             (0..n_items).map(|item| start(command, folder.path(), &["--items", &item.to_string()])).collect(),

@@ -11,6 +11,7 @@ use ntp::progress::Stopwatch;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::killing::killed_after;
 use crate::length::{from_environment, tell};
 use crate::pipeline::{hashes, run};
 use crate::smoke::copy_folder;
@@ -80,19 +81,14 @@ fn finish(attempt: &Attempt, root: &Path) {
 
 /// Starts the command and kills it after a while; false when it had ended by itself.
 fn kill_after(attempt: &Attempt, wait: Duration) -> bool {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_ntp"))
+    let child = Command::new(env!("CARGO_BIN_EXE_ntp"))
         .args(&attempt.arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    std::thread::sleep(wait);
-    let was_running = child.try_wait().unwrap().is_none();
-    // On Unix this is SIGKILL.
-    let _ended = child.kill();
-    child.wait().unwrap();
-    was_running
+    killed_after(child, wait)
 }
 
 #[test]

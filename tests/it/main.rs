@@ -50,6 +50,8 @@ mod ingest;
 #[cfg(test)]
 mod kill;
 #[cfg(test)]
+mod killing;
+#[cfg(test)]
 mod kinematic;
 #[cfg(test)]
 mod kitting;

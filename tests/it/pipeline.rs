@@ -7,6 +7,7 @@ use std::time::Duration;
 use ntp::artifact::{Plan, sha256_file};
 use ntp::pipeline::{Pipeline, PipelineError, PipelineFile, RunDir};
 
+use crate::killing::killed_after;
 use crate::smoke;
 
 pub(crate) fn repository() -> &'static Path {
@@ -77,16 +78,12 @@ fn a_run_killed_at_any_moment_carries_on_to_the_same_bytes() {
     for share in [0.05, 0.15, 0.3, 0.45, 0.6, 0.8] {
         let broken = tempfile::tempdir().unwrap();
         let out = broken.path().to_string_lossy();
-        let mut child = ntp(&["run", smoke::PIPELINE, "--out", out.as_ref()])
+        let child = ntp(&["run", smoke::PIPELINE, "--out", out.as_ref()])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(smoke::lasted().mul_f64(share));
-        n_killed += usize::from(child.try_wait().unwrap().is_none());
-        // A child that has already ended is fine, if not all have.
-        let _ended = child.kill();
-        child.wait().unwrap();
+        n_killed += usize::from(killed_after(child, smoke::lasted().mul_f64(share)));
         let (code, _, stderr) = run_smoke(broken.path(), &[]);
         assert_eq!(code, 0, "killed after {share} of its time: {stderr}");
         let found = hashes(broken.path(), &ALL);

@@ -9,9 +9,11 @@ use ntp::artifact::sha256_file;
 use ntp::recording::ShardReader;
 use ntp::video::decode_png;
 
+use crate::killing::killed_after;
 use crate::pipeline::{ALL, hashes, run};
 
-const PIPELINE: &str = r#"
+/// What is seen is learned from, and acted.
+pub(crate) const PIPELINE: &str = r#"
 name = "seeing"
 seed = 3
 [tasks]
@@ -60,19 +62,16 @@ fn command(arguments: &[&str]) -> (i32, String) {
     (code, stderr)
 }
 
-/// Lets a command run for some time at most.
-fn killed(arguments: &[&str], after_millis: u64) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_ntp"))
+/// Starts a command and kills it after a while; false when it had ended by itself.
+fn killed(arguments: &[&str], after_millis: u64) -> bool {
+    let child = Command::new(env!("CARGO_BIN_EXE_ntp"))
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_millis(after_millis));
-    // A child that has already ended is fine.
-    let _ended = child.kill();
-    child.wait().unwrap();
+    killed_after(child, Duration::from_millis(after_millis))
 }
 
 /// A finished run; its folder.
@@ -100,14 +99,16 @@ fn a_dataset_with_pictures_is_all_that_training_needs() {
 fn a_run_with_pictures_killed_at_any_moment_carries_on_to_the_same_bytes() {
     let (whole, ..) = finished();
     let wanted = hashes(&whole.path().join("run"), &ALL);
+    let mut n_killed = 0;
     for kill_after_millis in [100, 300, 500, 800, 1200] {
         let folder = tempfile::tempdir().unwrap();
         let [pipeline, out] = written(folder.path(), unchanged);
-        killed(&["run", &pipeline, "--out", &out], kill_after_millis);
+        n_killed += usize::from(killed(&["run", &pipeline, "--out", &out], kill_after_millis));
         let (code, stderr) = command(&["run", &pipeline, "--out", &out]);
         assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
         assert_eq!(hashes(&folder.path().join("run"), &ALL), wanted, "killed after {kill_after_millis} ms");
     }
+    assert!(n_killed > 0, "none was running when it was killed");
 }
 
 /// The pipeline with both detectors in place of its model.
@@ -133,14 +134,16 @@ fn detectors_are_trained_to_their_receipts_and_killed_at_any_moment_to_the_same_
     assert_eq!(code, 0);
     assert!(told.lines().count() > 6 && told.lines().all(|line| line.contains("up to date")), "{told}");
     let wanted = hashes(&whole.path().join("run"), &["models"]);
-    for kill_after_millis in [600, 1000] {
+    let mut n_killed = 0;
+    for kill_after_millis in [300, 600, 1000] {
         let folder = tempfile::tempdir().unwrap();
         let [pipeline, out] = written(folder.path(), detecting);
-        killed(&["run", &pipeline, "--out", &out], kill_after_millis);
+        n_killed += usize::from(killed(&["run", &pipeline, "--out", &out], kill_after_millis));
         let (code, stderr) = command(&["run", &pipeline, "--out", &out, "--to", "train"]);
         assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");
         assert_eq!(hashes(&folder.path().join("run"), &["models"]), wanted, "killed after {kill_after_millis} ms");
     }
+    assert!(n_killed > 0, "none was running when it was killed");
 }
 
 #[test]

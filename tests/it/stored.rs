@@ -7,6 +7,7 @@ use std::process::{Child, Stdio};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::killing::killed_after;
 use crate::pipeline::{ALL, hashes, ntp, run};
 use crate::smoke::{self, PIPELINE};
 
@@ -138,11 +139,9 @@ fn an_item_that_is_killed_is_done_elsewhere_or_kept_when_it_is_carried_on() {
     let machines = Machines::with("tasks");
     let mut n_killed = 0;
     for kill in 0..4 {
-        let mut child = machines.start("a", "generate", &["--part", "0/1"]);
-        std::thread::sleep(smoke::lasted().mul_f64(0.01 * f64::from(kill + 1)));
-        n_killed += usize::from(child.try_wait().unwrap().is_none());
-        let _ended = child.kill();
-        child.wait().unwrap();
+        let child = machines.start("a", "generate", &["--part", "0/1"]);
+        let wait = smoke::lasted().mul_f64(0.01 * f64::from(kill + 1));
+        n_killed += usize::from(killed_after(child, wait));
     }
     assert!(n_killed > 0, "none was running when it was killed");
     for item in ["0", "1", "2"] {
