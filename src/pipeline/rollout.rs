@@ -1,30 +1,30 @@
 //! Stage `rollout`: every model acts every suite, shard by shard, in physics.
 
+mod learned;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, Manifest, Receipt, StageDir};
-use crate::model::{ComputeDevice, Decoder, ModelConfig, check_purpose, load_config};
+use crate::model::Decoder;
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, perceiving, simulation_config, world};
 use crate::pipeline::recorded::RolloutSettings;
+use crate::pipeline::rollout::learned::Learned;
 use crate::pipeline::train::{self, Model};
 use crate::pipeline::trials::trial;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{
-    ModelSpec, OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, Study, SuiteSpec, detections, facts,
-    tasks,
+    OrderSpec, Pipeline, PipelineError, RecordedFrames, RunDir, Stage, Study, SuiteSpec, detections, facts, tasks,
 };
 use crate::recording::ShardWriter;
 use crate::render::CameraConfig;
 use crate::robot::RobotApi as _;
 use crate::rollout::{
-    self, Acted, DetectionRows, Limits, ModelFacts, Noisy, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows,
-    Sight, Start, load_policy_on,
+    self, Acted, DetectionRows, Limits, Noisy, Oracle, Policy, RolloutEpisode, RolloutError, RolloutRows, Sight, Start,
 };
 use crate::seed::Seed;
 use crate::sim::Simulation;
@@ -164,7 +164,7 @@ impl Unit for Suite<'_> {
     fn open<'j>(&'j self, job: &'j Job<'_>) -> Result<Box<dyn Worker + 'j>, PipelineError> {
         let task_set = tasks::read(job.context.dir)?;
         let tasks = suite_tasks(self.pipeline, &task_set, self.spec, self.trained_on())?;
-        let learned = self.actor.map(|actor| learned(job.context.dir, actor));
+        let learned = self.actor.map(|actor| Learned::of(job.context.dir, actor));
         Ok(Box::new(Acting { pipeline: self.pipeline, unit: self, spec: self.spec, job, tasks, learned }))
     }
 
@@ -206,50 +206,6 @@ struct Acting<'j> {
     job: &'j Job<'j>,
     tasks: Vec<Task>,
     learned: Option<Learned>,
-}
-
-/// Where a trained model lies and how it decodes. Each shard loads its own: a policy keeps what it has read of
-/// demonstrations.
-struct Learned {
-    folder: PathBuf,
-    spec: ModelSpec,
-    decoder: Decoder,
-    /// Whether the decoder is the model's first.
-    is_first: bool,
-    acted: Acted,
-}
-
-fn learned(run: &RunDir, ModelActor { model, decoder }: ModelActor<'_>) -> Learned {
-    let spec = model.spec;
-    let acted = Acted {
-        training_seed: model.seed,
-        train_tasks: Some(model.train_tasks()),
-        specification: Some(spec.specification().name()),
-        decoder: Some(decoder.name()),
-        model: Some(ModelFacts::from(spec.variant)),
-    };
-    let folder = model.dir(run).path().to_owned();
-    let is_first = spec.decoders.first() == Some(&decoder);
-    Learned { folder, spec: spec.clone(), decoder, is_first, acted }
-}
-
-impl Learned {
-    /// Refuses a model that was made for another family, another number of slots, pictures of another size or of other
-    /// cameras, or as another variant.
-    fn policy(&self, pipeline: &Pipeline, device: ComputeDevice) -> Result<Box<dyn Policy>, PipelineError> {
-        let found = load_config(&self.folder)?;
-        let family = pipeline.spec.tasks.family;
-        let ModelSpec { variant, .. } = self.spec;
-        let form = self.spec.specification();
-        let mut wanted = ModelConfig::new(variant, form, family, family.n_slots(), found.training.clone());
-        let cameras = self.spec.looks_with(&pipeline.spec.generate);
-        if let Some(camera) = cameras.first() {
-            wanted.network = wanted.network.for_pictures(camera.size_px[0] as usize, cameras.len(), wanted.n_slots);
-            wanted.cameras = self.spec.camera_names(&pipeline.spec.generate);
-        }
-        check_purpose(&found, &wanted, &self.folder)?;
-        Ok(load_policy_on(&device.open()?, &self.folder, self.decoder)?.1)
-    }
 }
 
 /// What a suite's demonstrations depend on; policies read their boundaries.
