@@ -89,7 +89,6 @@ pub use scoping::ScopeHead;
 pub use scoping_kind::{MAX_ARGUMENTS, ScopingKind};
 pub use sighted::{Naming, PerceptNaming, Percepts, Sighted, SightedConfig, SightedDemonstration, SightedReading};
 pub use specification_rows::{SpecificationRows, States};
-pub(crate) use store::cameras;
 pub use store::{
     CONFIG_FILE, ModelError, ModelSummary, WEIGHTS_FILE, check_purpose, inspect, load, load_config, weights_from_bytes,
     weights_to_bytes,

@@ -331,6 +331,12 @@ impl ModelConfig {
         self.families().map(Family::name).collect::<Vec<_>>().join(", ")
     }
 
+    /// The cameras that it looks with; another model's where nobody named its own.
+    pub(crate) fn cameras_beside(&self, other: &Self) -> String {
+        let names = if self.cameras.is_empty() { &other.cameras } else { &self.cameras };
+        names.join(", ")
+    }
+
     /// Whether it can be asked for tasks of a family: it knows the root program, or takes all roots for one.
     pub fn acts(&self, family: Family) -> bool {
         self.shared_root || self.families().any(|own| own.root_program() == family.root_program())

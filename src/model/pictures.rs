@@ -56,6 +56,12 @@ impl Pictures {
         Self { n: 0, width, height, ..Self::default() }
     }
 
+    /// Pixels across and down one that holds the pictures of several cameras, one below the other.
+    pub(crate) fn size_of(cameras: impl Iterator<Item = [u32; 2]>) -> (usize, usize) {
+        let sizes = cameras.map(|size| size.map(|pixels| pixels as usize));
+        sizes.fold((0, 0), |(across, down), [width, height]| (across.max(width), down + height))
+    }
+
     /// Adds one, taken by a robot in a state; all are of one size.
     pub fn push(&mut self, rgb: &[u8], gripper: GripperState) {
         debug_assert_eq!(rgb.len(), self.n_bytes(), "a picture of another size");

@@ -194,7 +194,7 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         ("specification", config.network.specification().to_string(), wanted.network.specification().to_string()),
         ("n_slots", n_slots.to_string(), wanted.n_slots.to_string()),
         ("pictures", pixels(config), pixels(wanted)),
-        ("cameras", cameras(config, wanted), cameras(wanted, config)),
+        ("cameras", config.cameras_beside(wanted), wanted.cameras_beside(config)),
     ];
     match fields.into_iter().find(|(_, found, expected)| found != expected) {
         Some((field, found, expected)) => {
@@ -202,12 +202,6 @@ pub fn check_purpose(config: &ModelConfig, wanted: &ModelConfig, folder: &Path) 
         }
         None => Ok(()),
     }
-}
-
-/// The cameras of one of two models; as of the other where nobody named them.
-pub(crate) fn cameras(of: &ModelConfig, other: &ModelConfig) -> String {
-    let names = if of.cameras.is_empty() { &other.cameras } else { &of.cameras };
-    names.join(", ")
 }
 
 fn pixels(config: &ModelConfig) -> String {

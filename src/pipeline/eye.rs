@@ -57,7 +57,6 @@ fn look(films: &mut [Film], scene: &Scene, frame: &Frame, into: &mut Pictures) {
 }
 
 fn nothing(films: &[Film]) -> Pictures {
-    let sizes = films.iter().map(|film| film.config().size_px.map(|pixels| pixels as usize));
-    let (width, height) = sizes.fold((0, 0), |(across, down), [width, height]| (across.max(width), down + height));
+    let (width, height) = Pictures::size_of(films.iter().map(|film| film.config().size_px));
     Pictures::of_size(width, height)
 }

@@ -53,7 +53,7 @@ impl<'p> OfBuffers<'p> {
 
 impl Galleries for OfBuffers<'_> {
     fn size(&self) -> (usize, usize) {
-        size(self.cameras.iter().map(|camera| camera.size_px))
+        Pictures::size_of(self.cameras.iter().map(|camera| camera.size_px))
     }
 
     fn cameras(&self) -> Vec<String> {
@@ -67,7 +67,7 @@ impl Galleries for OfBuffers<'_> {
 
 impl Gallery for Streamed {
     fn size(&self) -> (usize, usize) {
-        size(self.loaders.iter().map(|(_, loader)| loader.size_px()))
+        Pictures::size_of(self.loaders.iter().map(|(_, loader)| loader.size_px()))
     }
 
     fn cameras(&self) -> Vec<String> {
@@ -94,10 +94,4 @@ impl Gallery for Streamed {
     fn announce(&self, wanted: &[Wanted]) {
         self.loaders.iter().for_each(|(_, loader)| loader.announce(wanted));
     }
-}
-
-/// Pixels across and down the pictures of cameras, one below the other.
-fn size(cameras: impl Iterator<Item = [u32; 2]>) -> (usize, usize) {
-    let sizes = cameras.map(|size| size.map(|pixels| pixels as usize));
-    sizes.fold((0, 0), |(across, down), [width, height]| (across.max(width), down + height))
 }

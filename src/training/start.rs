@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::module::Module;
 
 use crate::artifact;
-use crate::model::{ModelConfig, ModelError, WEIGHTS_FILE, cameras, load_config, weights_from_bytes};
+use crate::model::{ModelConfig, ModelError, WEIGHTS_FILE, load_config, weights_from_bytes};
 use crate::training::TrainError;
 
 /// Weights to begin with.
@@ -42,7 +42,7 @@ fn difference(found: &ModelConfig, wanted: &ModelConfig) -> Option<(&'static str
         [
             ("variant", model.variant.to_string()),
             ("number of cameras", model.network.cameras().to_string()),
-            ("list of cameras", cameras(model, other)),
+            ("list of cameras", model.cameras_beside(other)),
             ("network", widths(model)),
             ("n_slots", model.n_slots.to_string()),
             ("vocabulary", model.vocabulary.clone()),
