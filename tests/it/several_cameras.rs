@@ -14,6 +14,7 @@ use ntp::training::Gallery;
 use crate::kinematic::{KinematicWorld, demonstration, trial};
 use crate::painter::{Painter, Paintings};
 use crate::pipeline::{hashes, run};
+use crate::pipeline_pictures::PIPELINE;
 use crate::seeing::{learn_from, shown, training};
 
 /// Two cameras, of which the first has its lid on.
@@ -88,44 +89,18 @@ fn convolutions_give_the_vectors_of_both_cameras_side_by_side() {
     assert_ne!(values[128..256], values[384..], "the second does not");
 }
 
-const PIPELINE: &str = r#"
-name = "several"
-seed = 3
-[tasks]
-family = "block_stacking"
-train = 3
-unseen = 4
-[generate]
-trials_per_task = 3
-episodes_per_shard = 4
-[[generate.cameras]]
-name = "front"
-size_px = [32, 32]
-[[generate.cameras]]
-name = "wrist"
-view = "wrist"
-size_px = [32, 32]
-format = "h264"
-[[generate.cameras]]
-name = "wide"
-size_px = [48, 32]
-MODELS
-[rollout]
-record = 0
-[[rollout.suites]]
-name = "stacking_unseen"
-split = "unseen"
-episodes = 2
-"#;
-
 /// A model of some cameras.
 fn model(variant: &str, tag: &str, cameras: &str) -> String {
     format!("[[models]]\nvariant = \"{variant}\"\ntag = \"{tag}\"\n{cameras}\n[models.training]\nsteps = 2\n")
 }
 
+/// Writes a pipeline file with a third camera and other models into a folder; its path and that of the run.
 fn written(folder: &Path, models: &[String]) -> [String; 2] {
     let path = folder.join("several.toml");
-    std::fs::write(&path, PIPELINE.replace("MODELS", &models.concat())).unwrap();
+    let (before, rest) = PIPELINE.split_once("[[models]]").unwrap();
+    let (_, after) = rest.split_once("[rollout]").unwrap();
+    let wide = "[[generate.cameras]]\nname = \"wide\"\nsize_px = [48, 32]\n";
+    std::fs::write(&path, [before, wide, &models.concat(), "[rollout]", after].concat()).unwrap();
     [path, folder.join("run")].map(|path| path.to_string_lossy().into_owned())
 }
 
