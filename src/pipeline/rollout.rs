@@ -1,6 +1,6 @@
 //! Stage `rollout`: every model acts every suite, shard by shard, in physics.
 
-mod learned;
+mod actor;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -8,13 +8,12 @@ use std::ops::Range;
 use serde_json::{Value, json};
 
 use crate::artifact::{FileEntry, Manifest, Receipt, StageDir};
-use crate::model::Decoder;
 use crate::pipeline::demonstration::{self, Demonstrations};
 use crate::pipeline::eye::sight;
 use crate::pipeline::generate::{disturbed, perceiving, simulation_config, world};
 use crate::pipeline::recorded::RolloutSettings;
-use crate::pipeline::rollout::learned::Learned;
-use crate::pipeline::train::{self, Model};
+use crate::pipeline::rollout::actor::{Learned, ModelActor, decoding};
+use crate::pipeline::train;
 use crate::pipeline::trials::trial;
 use crate::pipeline::unit::{Amount, Job, Made, Unit, Worker};
 use crate::pipeline::{
@@ -51,13 +50,6 @@ pub(super) struct Suite<'p> {
     pub(super) spec: &'p SuiteSpec,
 }
 
-/// A trained model with a way to decode.
-#[derive(Clone, Copy)]
-pub(super) struct ModelActor<'p> {
-    pub(super) model: Model<'p>,
-    decoder: Decoder,
-}
-
 /// Every suite of the oracle, where it is asked for, then of every model with each of its seeds and decoders.
 pub(super) fn units(pipeline: &Pipeline) -> Vec<Suite<'_>> {
     let oracle = pipeline.spec.rollout.oracle.then_some(None);
@@ -74,11 +66,6 @@ pub(super) fn units_of_study<'p>(study: &'p Study, pipeline: &'p Pipeline) -> Ve
         suite.spec.split == Split::Unseen || suite.actor.is_some_and(learned)
     };
     suites.filter(is_fair).collect()
-}
-
-/// A model with each of its decoders.
-fn decoding(model: Model<'_>) -> impl Iterator<Item = ModelActor<'_>> {
-    model.spec.decoders.iter().map(move |&decoder| ModelActor { model, decoder })
 }
 
 /// The suites that an actor acts.

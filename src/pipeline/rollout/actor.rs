@@ -1,12 +1,24 @@
-//! A trained model as a suite's actor.
+//! A trained model as a suite's actor: which it is, and what it takes to let it act.
 
 use std::path::PathBuf;
 
 use crate::model::{ComputeDevice, Decoder, ModelConfig, check_purpose, load_config};
-use crate::pipeline::rollout::ModelActor;
+use crate::pipeline::train::Model;
 use crate::pipeline::unit::Unit as _;
 use crate::pipeline::{ModelSpec, Pipeline, PipelineError, RunDir};
 use crate::rollout::{Acted, ModelFacts, Policy, load_policy_on};
+
+/// A trained model with a way to decode.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct ModelActor<'p> {
+    pub(in crate::pipeline) model: Model<'p>,
+    pub(super) decoder: Decoder,
+}
+
+/// A model with each of its decoders.
+pub(super) fn decoding(model: Model<'_>) -> impl Iterator<Item = ModelActor<'_>> {
+    model.spec.decoders.iter().map(move |&decoder| ModelActor { model, decoder })
+}
 
 /// Where a trained model lies and how it decodes. Each shard loads its own: a policy keeps what it has read of
 /// demonstrations.
