@@ -13,7 +13,7 @@ use crate::killing::killed_after;
 use crate::pipeline::{ALL, hashes, run};
 
 /// What is seen is learned from, and acted.
-pub(crate) const PIPELINE: &str = r#"
+const PIPELINE: &str = r#"
 name = "seeing"
 seed = 3
 [tasks]
@@ -43,6 +43,13 @@ name = "stacking_unseen"
 split = "unseen"
 episodes = 4
 "#;
+
+/// The pipeline with other models, and with what else stands before them.
+pub(crate) fn with_models(models: &str) -> String {
+    let (before, rest) = PIPELINE.split_once("[[models]]").unwrap();
+    let (_, after) = rest.split_once("[rollout]").unwrap();
+    [before, models, "[rollout]", after].concat()
+}
 
 /// Writes a pipeline file, changed, into a folder; its path and that of the run.
 fn written(folder: &Path, change: impl Fn(&str) -> String) -> [String; 2] {
@@ -112,22 +119,20 @@ fn a_run_with_pictures_killed_at_any_moment_carries_on_to_the_same_bytes() {
 }
 
 /// The pipeline with both detectors in place of its model.
-fn detecting(text: &str) -> String {
+fn detecting() -> String {
     let model = |variant: &str| {
         format!(
             "[[models]]\nvariant = \"{variant}\"\n[models.training]\nsteps = 4\ncheckpoint_every = 2\n\
              [models.training.detector]\nsteps = 5\npictures = 8\n"
         )
     };
-    let (before, rest) = text.split_once("[[models]]").unwrap();
-    let (_, after) = rest.split_once("[rollout]").unwrap();
-    [before, &model("ntp_vid_detector"), &model("ntp_vid_detector_paper"), "[rollout]", after].concat()
+    with_models(&(model("ntp_vid_detector") + &model("ntp_vid_detector_paper")))
 }
 
 #[test]
 fn detectors_are_trained_to_their_receipts_and_killed_at_any_moment_to_the_same_bytes() {
     let whole = tempfile::tempdir().unwrap();
-    let [pipeline, out] = written(whole.path(), detecting);
+    let [pipeline, out] = written(whole.path(), |_| detecting());
     let (code, stderr) = command(&["run", &pipeline, "--out", &out]);
     assert_eq!(code, 0, "{stderr}");
     let (code, told, _) = run(&["run", &pipeline, "--out", &out, "--dry-run"]);
@@ -137,7 +142,7 @@ fn detectors_are_trained_to_their_receipts_and_killed_at_any_moment_to_the_same_
     let mut n_killed = 0;
     for kill_after_millis in [300, 600, 1000] {
         let folder = tempfile::tempdir().unwrap();
-        let [pipeline, out] = written(folder.path(), detecting);
+        let [pipeline, out] = written(folder.path(), |_| detecting());
         n_killed += usize::from(killed(&["run", &pipeline, "--out", &out], kill_after_millis));
         let (code, stderr) = command(&["run", &pipeline, "--out", &out, "--to", "train"]);
         assert_eq!(code, 0, "killed after {kill_after_millis} ms: {stderr}");

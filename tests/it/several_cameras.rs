@@ -14,7 +14,7 @@ use ntp::training::Gallery;
 use crate::kinematic::{KinematicWorld, demonstration, trial};
 use crate::painter::{Painter, Paintings};
 use crate::pipeline::{hashes, run};
-use crate::pipeline_pictures::PIPELINE;
+use crate::pipeline_pictures::with_models;
 use crate::seeing::{learn_from, shown, training};
 
 /// Two cameras, of which the first has its lid on.
@@ -97,10 +97,8 @@ fn model(variant: &str, tag: &str, cameras: &str) -> String {
 /// Writes a pipeline file with a third camera and other models into a folder; its path and that of the run.
 fn written(folder: &Path, models: &[String]) -> [String; 2] {
     let path = folder.join("several.toml");
-    let (before, rest) = PIPELINE.split_once("[[models]]").unwrap();
-    let (_, after) = rest.split_once("[rollout]").unwrap();
     let wide = "[[generate.cameras]]\nname = \"wide\"\nsize_px = [48, 32]\n";
-    std::fs::write(&path, [before, wide, &models.concat(), "[rollout]", after].concat()).unwrap();
+    std::fs::write(&path, with_models(&(wide.to_owned() + &models.concat()))).unwrap();
     [path, folder.join("run")].map(|path| path.to_string_lossy().into_owned())
 }
 
