@@ -236,6 +236,9 @@ fn model(
         check_kernel(kernel, facts.longest)?;
         model.network = model.network.with_scope_kernel(kernel as usize);
     }
+    if let Some(width) = config.width {
+        model.network = model.network.with_width(width as usize);
+    }
     if config.relations {
         model.network = model.network.with_relations();
     }

@@ -145,6 +145,21 @@ impl NetworkConfig {
         self
     }
 
+    /// The same with hidden layers of another width.
+    #[must_use]
+    pub fn with_width(mut self, features: usize) -> Self {
+        let width = match &mut self {
+            Self::ObjectCentric(widths) | Self::Detected(_, widths) => &mut widths.width,
+            Self::Flattened(widths) | Self::DetectedFlattened(_, widths) => &mut widths.width,
+            Self::Instructed(widths) => &mut widths.width,
+            Self::ColourSlots(widths) => &mut widths.width,
+            Self::Convolved(widths) => &mut widths.flattened.width,
+            Self::Keypoints(widths) => &mut widths.width,
+        };
+        *width = features;
+        self
+    }
+
     /// The same with the displacements between slots beside their positions; widths that read no vector of positions
     /// stay as they are.
     #[must_use]

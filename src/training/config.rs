@@ -182,6 +182,10 @@ pub struct TrainConfig {
     /// which category the segment before was of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scope_kernel: Option<u32>,
+    /// Features of the hidden layers, 1 to 4096. By default 96 in flattened networks and 32 in others. Time and memory of
+    /// a step grow with its square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<u32>,
     /// Whether flattened networks read the displacements between slots beside their positions. Off by default, as in the
     /// paper, whose discussion names relationships between objects as future work.
     #[serde(skip_serializing_if = "is_off")]
@@ -244,6 +248,7 @@ impl Default for TrainConfig {
             noise: ObservationNoise::default(),
             colours: None,
             scope_kernel: None,
+            width: None,
             relations: false,
             shared_root: false,
             start_from: None,
@@ -337,6 +342,12 @@ impl TrainConfig {
         let mut wrong = counts.map(|(key, value)| refuse(key, value.to_string(), "at least 1"));
         if let Some(error) = wrong.next() {
             return Err(error);
+        }
+        match self.width {
+            Some(width) if !(1..=4096).contains(&width) => {
+                return Err(refuse("width", width.to_string(), "1 to 4096"));
+            }
+            Some(_) | None => {}
         }
         let numbers = (positive.into_iter().map(|(key, value)| (key, value, value > 0.0, "greater than 0")))
             .chain(shares.map(|(key, value)| (key, value, (0.0..=1.0).contains(&value), "from 0 to 1")))

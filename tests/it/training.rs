@@ -558,6 +558,29 @@ fn a_scope_kernel_is_the_network_s_and_one_that_is_even_or_too_long_is_refused()
 }
 
 #[test]
+fn a_width_is_the_network_s_hidden_layers_and_one_that_no_network_has_is_refused() {
+    let data = towers();
+    let with = |width| TrainConfig { steps: Some(1), width: Some(width), ..short() };
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |width| train_until(&ntp(with(width)), &data, folder.path(), None).unwrap_err().to_string();
+    assert_eq!(refused(0), "width is 0; allowed: 1 to 4096");
+    assert_eq!(refused(4097), "width is 4097; allowed: 1 to 4096");
+    let widths = |variant, width| {
+        let folder = tempfile::tempdir().unwrap();
+        train_until(&Training { variant, ..ntp(with(width)) }, &data, folder.path(), None).unwrap();
+        match ntp::model::load_config(folder.path()).unwrap().network {
+            ntp::model::NetworkConfig::ObjectCentric(widths) => widths.width,
+            ntp::model::NetworkConfig::Flattened(widths) => widths.width,
+            other => panic!("{other:?}"),
+        }
+    };
+    let paper = "flat_gru_paper".parse().unwrap();
+    for width in [1, 7, 40] {
+        assert_eq!([widths(Variant::NTP, width), widths(paper, width)], [width as usize; 2]);
+    }
+}
+
+#[test]
 fn relations_are_read_by_flattened_networks_alone() {
     let data = towers();
     let related = TrainConfig { steps: Some(1), relations: true, ..short() };
